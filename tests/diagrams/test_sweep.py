@@ -173,6 +173,15 @@ def test_an_undamped_motion_is_never_called_settled(linear: ns.System) -> None:
     assert swept["period_number"].values[0] == 0
 
 
+def test_undamped_motions_that_all_repeat_are_no_attractors() -> None:
+    """x'' + x = cos w t, w = 1/2, 1/3 and 2: every motion repeats after one, one and two periods, and none attracts."""
+    free = ns.mechanical(
+        1.0, 0.0, 1.0, parameters={"w": 0.5}, forcing={"q": lambda t, p: np.cos(p.w * t)}, coordinates=["q"]
+    )
+    swept = ns.sweep(free, "w", [0.5, 1 / 3, 2.0], start=[0.3, 0.1], direction=None, **QUIET)
+    assert (swept["period_number"] == 0).all() and words(swept["status"]) == ["slow"] * 3
+
+
 def test_a_motion_that_dies_out_has_period_one(linear: ns.System) -> None:
     """Without forcing x decays like exp(-c t / 2 m); its section points shrink by the same factor at every return."""
     swept = ns.sweep(linear, "rho", [0.0], start={"x": 0.01}, transient=100, keep=20, **QUIET)

@@ -166,16 +166,22 @@ def multiplier(images, start, size, difference, work):
     """Largest modulus of the multipliers of the map whose images (n + 1, n) of a point and its neighbours these are.
 
     Neighbour j is ``difference`` * size[j] away in state j; ``work`` (2, n, n) is scratch. A state that repeats its
-    start, beside it too, is held, as by friction: along it lie others of a set, and its 1 is no multiplier."""
-    n = size.shape[0]
+    start, beside it too, is held, as by friction: along it lie others of a set, and its 1 is no multiplier. Friction
+    takes a speed for each place it holds: where fewer states forget where they began, damping is missing."""
+    n, held, forgotten = size.shape[0], 0, 0
     A, B = work[0], work[1]
+    for k in range(n):
+        most, nudge = 0.0, difference * size[k]
+        for j in range(n):
+            A[k, j] = (images[j + 1, k] - images[0, k]) / nudge
+            most = max(most, fabs(A[k, j]))
+        forgotten += most <= ALONG
+        off, beside = fabs(images[0, k] - start[k]), fabs(images[k + 1, k] - start[k] - nudge)
+        near = max(off, beside) <= ULPS * fabs(start[k]) + ALONG * nudge
+        held += near
+        B[k, 0] = 2.0 if off == 0.0 and beside <= ULPS * (fabs(start[k]) + nudge) else 1.0 if near else 0.0
     for j in range(n):
-        for k in range(n):
-            A[k, j] = (images[j + 1, k] - images[0, k]) / (difference * size[k])
-    for j in range(n):
-        nudge = difference * size[j]
-        off = max(fabs(images[0, j] - start[j]), fabs(images[j + 1, j] - start[j] - nudge))
-        if off <= ULPS * fabs(start[j]) + ALONG * nudge:
+        if B[j, 0] == 2.0 or (B[j, 0] == 1.0 and held <= forgotten):
             for k in range(n):
                 A[j, k] = 0.0
                 A[k, j] = 0.0
