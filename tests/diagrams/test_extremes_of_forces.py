@@ -28,5 +28,3 @@ def test_a_friction_torn_off_at_once_bears_no_more_than_it_can(method: str) -> N
     assert (swept["period_number"] == 1).all() and (swept["stop_force_maximum"] > 1.4).all()
     assert swept["belt_force_maximum"].values == pytest.approx(0.3, abs=1e-9)
     assert (swept["belt_force_minimum"] > -0.6).all()
-    shown = ns.simulate(system, periods=20, method=method)["belt_force"]  # type: ignore[arg-type]
-    assert shown.max() <= 0.3 + 1e-9 and shown.min() > -0.6

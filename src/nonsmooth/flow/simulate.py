@@ -79,12 +79,11 @@ def simulate(
         ``u(time, state)``, ``mode``, ``segment`` (each crossing stands twice in ``time``: the limits before and
         after), ``crossing_time``, ``crossing_transition``, ``u_before``, ``u_after``, the touches (``touch_time``,
         ``touch_indicator``, ``touch_u``, ``touch_clearance``: maxima of an armed indicator that do not reach zero),
-        the outputs (where a segment lasts no time, those before it), and ``status``. For each rigid stop among the
-        elements, over ``crossing``: ``<element>_impulse``, ``<element>_impact_speed`` (of approach; 0 where it rests
-        and takes an impulse of another one's impact; else NaN) and ``<element>_energy_lost``, the energy that the
-        impact dissipates. The output ``<element>_force`` is the force between impacts, without impulses. A run that
-        stays at an equilibrium from its start says so in the attribute ``note``, and in a warning where the equilibrium
-        is unstable.
+        the outputs, and ``status``. For each rigid stop among the elements, over ``crossing``: ``<element>_impulse``,
+        ``<element>_impact_speed`` (of approach; 0 where it rests and takes an impulse of another one's impact; else
+        NaN) and ``<element>_energy_lost``, the energy that the impact dissipates. The output ``<element>_force`` is the
+        force between impacts, without impulses. A run that stays at an equilibrium from its start says so in the
+        attribute ``note``, and in a warning where the equilibrium is unstable.
 
     Raises
     ------
@@ -252,9 +251,6 @@ def _dataset(
     if traced.output_names:
         kept = np.zeros((len(merged.time), 0)) if memory is None else memory
         outputs = output_values(traced, system.parameter_vector(), merged.time, merged.u, kept, merged.mode)
-        passing = 1 + np.flatnonzero(np.diff(log.crossing_time) == 0.0)  # segments that last no time: as before them
-        lasts = ~np.isin(merged.segment, passing)
-        outputs = outputs[np.maximum.accumulate(np.where(lasts, np.arange(len(lasts)), 0))]
     return trajectory(
         labels,
         provenance(labels, "simulate", options, method=method),
