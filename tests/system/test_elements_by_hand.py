@@ -169,3 +169,26 @@ def test_a_mass_leaves_its_plate_where_its_friction_turns_round(method: str) -> 
         run = ns.simulate(system.with_parameters(w=w, late=late), duration=top + 0.2 / w, start=start, method=method)
         fall = 0.7 * np.array([0.5 * 0.04 / w**2, 0.2 / w])
         np.testing.assert_allclose(run.u.values[-1], [size - fall[0], -fall[1]], atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("speed", [0.0, 4.8e-49, 1e-20, 1e-16, 1e-12, 1e-9])
+def test_a_contact_that_parts_by_less_than_rounding_holds(speed: float, restitution: float, method: Any) -> None:
+    """Pressed by a force of 1 a mass turns after v^2 / 2: it rests at the other one, which friction holds."""
+    system = ns.mechanical(
+        np.eye(2),
+        0.1 * np.eye(2),
+        np.zeros((2, 2)),
+        parameters={},
+        forcing={"q2": lambda t, p: -1.0},
+        elements={
+            "stop": E.Stop(at={"q1": 1.0, "q2": -1.0}, position=0.3, restitution=restitution),
+            "rail": E.Coulomb(at="q1", friction=2.0),
+        },
+        coordinates=["q1", "q2"],
+    )
+    for rounding in (0.0, 6e-17, -6e-17):
+        start = {"q1": -0.5, "q2": -0.8 - rounding, "v_q2": speed}
+        run = ns.simulate(system, duration=1.0, start=start, method=method)
+        assert run["u"].values[-1] == pytest.approx([-0.5, -0.8, 0.0, 0.0], abs=1e-12)

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.system.derived.elements.element import CREEP
 from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
 from nonsmooth.system.derived.faces import is_symmetric, least
 from nonsmooth.system.derived.impacts import ZERO, Instant
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.instants import Ahead, Numbers
 
+NOISE = 3.6e-15  # of the terms of a gap: what is smaller the series methods take for zero (``kernels.series.crossing``)
 ORDERS = 24  # derivatives that are looked at where all before are zero
 
 
@@ -109,18 +111,19 @@ class _Instant(Instant):
     def outcome(self, contacts: list[int], struck: tuple[int, ...]) -> Outcome:
         """Those that hold and those that let go, with the rates as they are now.
 
-        Where a place decides, a slow rate may hold as zero does: the others are asked as if it did, and again with its
-        own where it does not."""
+        Where a place decides, or contacts part by less than rounding, a slow rate may hold as zero does: the others are
+        asked as if it did, and again with its own where it does not."""
         slow, own = [k for k in self.frictions if self.speeds[k] and not self._side(k)], self.speeds
+        near = [k for k in contacts if 0.0 < own[k] < CREEP * float(self.make.size(self.rates[k])) and self._meets(k)]
         while True:
-            self.speeds = self._stilled(own, slow)
+            self.speeds = self._stilled(own, slow) | dict.fromkeys(near, 0.0)
             candidates, slips = self._candidates(contacts, slow)
             states = self._states(candidates, slips) if candidates and not self.ends else {}
             if self.ends:
                 return self.end(self.ends, [*candidates, *slips] or contacts)
-            if all(states[k] == HELD for k in slow):
+            if all(states[k] == HELD for k in (*slow, *near)):
                 break
-            slow = [k for k in slow if states[k] == HELD]
+            slow, near = ([k for k in some if states[k] == HELD] for some in (slow, near))
         for k, state in states.items():
             element = self.parts[k].element
             self.put(k, element.held[0] if state == HELD else element.sides[state < 0] if state else element.phases[0])
@@ -131,6 +134,14 @@ class _Instant(Instant):
         if struck and slow:
             struck += tuple(len(self.parts) + k for k in self._independent([*slow, *candidates]))
         return Outcome(self.pattern, self.numbers.u.copy(), struck, self.rubbed)
+
+    def _meets(self, k: int) -> bool:
+        """Return whether a contact that parts would be no farther than rounding before it meets again."""
+        element = self.parts[k].element
+        if element.held[0] not in element.phases:
+            return False
+        pull = float(self._ahead([k]).rates()[1][0])
+        return self.speeds[k] ** 2 <= 2.0 * NOISE * self.numbers.terms(self.parts[k].where) * pull
 
     def _side(self, k: int, may_be_slow: bool = True) -> int:
         """The side on which a friction slips; 0 where it may hold."""
