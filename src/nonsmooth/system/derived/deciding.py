@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.system.derived.elements.element import CREEP
 from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
 from nonsmooth.system.derived.faces import is_symmetric, least
 from nonsmooth.system.derived.impacts import ZERO, Instant
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.instants import Ahead, Numbers
 
+PARTING = 1e-10  # of the scale of a rate: what parts faster is followed
 NOISE = 3.6e-15  # of the terms of a gap: what is smaller the series methods take for zero (``kernels.series.crossing``)
 ORDERS = 24  # derivatives that are looked at where all before are zero
 
@@ -114,7 +114,7 @@ class _Instant(Instant):
         Where a place decides, or contacts part by less than rounding, a slow rate may hold as zero does: the others are
         asked as if it did, and again with its own where it does not."""
         slow, own = [k for k in self.frictions if self.speeds[k] and not self._side(k)], self.speeds
-        near = [k for k in contacts if 0.0 < own[k] < CREEP * float(self.make.size(self.rates[k])) and self._meets(k)]
+        near = [k for k in contacts if 0.0 < own[k] < PARTING * float(self.make.size(self.rates[k])) and self._meets(k)]
         while True:
             self.speeds = self._stilled(own, slow) | dict.fromkeys(near, 0.0)
             candidates, slips = self._candidates(contacts, slow)
