@@ -128,6 +128,8 @@ class RowNumbers(Numbers):
 
     def shift(self, change: FloatArray) -> None:
         self.u += change
+        states = np.maximum(self.size[: self.rows.n], np.abs(self.u))  # an impact makes terms of what was zero
+        self.size = np.append(states, self.size[self.rows.n :])
 
     def ahead(self, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
         return _RowsAhead(self, some, forces, laws)
@@ -282,6 +284,7 @@ class SeriesNumbers(Numbers):
 
     def shift(self, change: FloatArray) -> None:
         self.u, self.known = self.u + change, {}
+        self.size = np.maximum(self.size, np.abs(self.u))
         self.lanes = self._lanes()
 
     def ahead(self, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
