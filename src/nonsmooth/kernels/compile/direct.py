@@ -31,7 +31,9 @@ class Callback:
         self.py_func, self.signature = function, signature
         self.__name__, self.__module__ = function.__name__, function.__module__
         names = function.__globals__
-        self.codegen = names.setdefault("_codegen", Codegen("models"))  # one of each file, which ends with it
+        if "_codegen" not in names:
+            names["_codegen"] = Codegen("models")  # one of each file, which ends with it
+        self.codegen = names["_codegen"]
         entry = entry_of(function, signature, self.codegen, {})
         with global_compiler_lock:
             code = read_entry(entry)

@@ -6,6 +6,7 @@ import ast
 import builtins
 import math
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, NoReturn
@@ -68,7 +69,7 @@ def _number(value: float | int) -> str:
     return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
 
 
-class Module:
+class Module(ABC):
     """Functions, arrays and declarations of one text for LLVM."""
 
     def __init__(self) -> None:
@@ -85,9 +86,9 @@ class Module:
         self.parts[name] = f"declare double @{name}({', '.join([REAL] * count)}) nounwind willreturn memory(none)"
         return f"@{name}"
 
+    @abstractmethod
     def inner(self, function: Any, given: list[Value | Array]) -> tuple[str, str]:
         """The name of a function with arguments of these kinds, and the kind that it returns."""
-        raise NotImplementedError
 
 
 class ScalarCode:
@@ -119,7 +120,7 @@ class ScalarCode:
         return [f"{name}{self.count}" for name in names]
 
     def _refuse(self, node: ast.AST) -> NoReturn:
-        raise NotImplementedError(f"{self.function.__name__}: {ast.unparse(node)}")
+        raise NotImplementedError(f"{self.function.__name__}: no machine code is made of `{ast.unparse(node)}`")
 
     def _store(self, name: str, value: Value) -> None:
         place = self.known.get(name)

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.instants import Ahead, Numbers
 
 PARTING = 1e-10  # of the scale of a rate: what parts faster is followed
-NOISE = 3.6e-15  # of the terms of a gap: what is smaller the series methods take for zero (``kernels.series.crossing``)
 ORDERS = 24  # derivatives that are looked at where all before are zero
 
 
@@ -137,6 +136,8 @@ class _Instant(Instant):
 
     def _meets(self, k: int) -> bool:
         """Return whether a contact that parts would be no farther than rounding before it meets again."""
+        from nonsmooth.kernels.series.crossing import NOISE  # by which the march judges
+
         element = self.parts[k].element
         if element.held[0] not in element.phases:
             return False
