@@ -455,12 +455,12 @@ def test_what_contacts_hold_is_no_exponent() -> None:
     assert ns.lyapunov(alone, duration=50.0, start={"q": 0.2})["exponents"].values == pytest.approx([0.0, -np.inf])
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.3])
+@pytest.mark.parametrize(("restitution", "rubs"), [(0.0, {}), (0.3, {}), (0.6, {"f": Coulomb(at="q", friction=0.1)})])
 @pytest.mark.parametrize("method", ["exact", "taylor"])
-def test_a_chatter_that_ends_in_rest_loses_place_and_speed(restitution: float, method: str) -> None:
-    """A mass on a shaken table rests in each period; another one, alone, keeps the trace of its damping."""
+def test_a_chatter_that_ends_in_rest_loses_place_and_speed(restitution: float, rubs: Any, method: str) -> None:
+    """A mass on a shaken table rests in each period, it may rub; another one, alone, keeps the trace of its damping."""
     shaken = {"q": lambda t, p: 1.5 * np.cos(t) - 1.0}
-    table = {"s": Stop(at="q", side=-1, position=0.0, restitution=restitution)}
+    table = {"s": Stop(at="q", side=-1, position=0.0, restitution=restitution), **rubs}
     options: Any = {"periods": 40, "transient": 10, "start": {"q": 0.3}, "method": method}
     alone = ns.mechanical(1.0, 0.1, 0.2, forcing=shaken, elements=table, coordinates=["q"])
     assert (ns.lyapunov(alone, **options).exponents.values == -np.inf).all()

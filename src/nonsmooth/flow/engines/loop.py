@@ -21,15 +21,17 @@ from nonsmooth.kernels.hybrid.codes import BEGUN, CROSSINGS, DEAD_END, FIRED, MO
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
-from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, FOUND, OWN, TOGETHER
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
 from nonsmooth.system.transition import phases, varying_phases
 
 if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.derived.instants import Numbers
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 DIVERGENCE = 1e9  # in units of a state's scale
 # Place 4 of ``Net.transitions``
-KINDS = {ALONE: codes.ALONE, OWN: codes.OWN, ASKS_BEHIND: codes.ASKS_BEHIND, FOUND: codes.ANSWER}
+KINDS = {ALONE: codes.ALONE, OWN: codes.OWN, ASKS_BEHIND: codes.ASKS_BEHIND}
 #: Called by the thread of a run whenever it pauses.
 at_pause: list[Callable[[], None]] = []
 SPARE = 64  # crossings that one leg may add to a log
@@ -125,6 +127,7 @@ class Engine(ABC):
         met = [] if fired < 0 else decider.met(self.traced.indicator_names[fired], self.traced.indicators[fired])
         found = begun(numbers, pattern) if starts else decide(numbers, pattern, met)
         there, taken = decider.number(base, found.pattern), -1
+        self.note_zeros(there, numbers, found.pattern, work)
         if starts:
             work.tally[MODE] = there
         else:
@@ -140,6 +143,9 @@ class Engine(ABC):
     def memory_in(self, work: Any) -> FloatArray:
         """The memory of the motion in the kernels' work: behind the states, or where an engine has it."""
         return np.asarray(work.w[len(self.scale) :][: len(self.traced.m)])
+
+    def note_zeros(self, mode: int, numbers: Numbers, pattern: Pattern, work: Any) -> None:  # noqa: B027  the exact flow judges as they do
+        """Let a march take for zero in the mode behind an answer what is zero by the numbers asked, nothing else."""
 
     def step_in(self, mode: int, system: Any) -> float:
         """A time in which states change as much as they do from one step to the next."""

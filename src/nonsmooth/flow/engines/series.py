@@ -17,9 +17,12 @@ from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
 from nonsmooth.kernels.hybrid.codes import LENGTH, METHODS
+from nonsmooth.system.derived.impacts import is_zero
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.generate import CompiledModel
+    from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.derived.instants import Numbers
     from nonsmooth.system.symbolic.traced import Traced
 
 
@@ -132,6 +135,11 @@ class SeriesEngine(Engine):
 
     def memory_in(self, work: Any) -> FloatArray:
         return np.asarray(work.q[len(self.traced.p) :])
+
+    def note_zeros(self, mode: int, numbers: Numbers, pattern: Pattern, work: Any) -> None:
+        meets = self.net.meets[self.net.meets_start[mode] : self.net.meets_start[mode + 1]]
+        for f, (_, one) in zip(meets, numbers.make.meetings(numbers.mode, pattern), strict=True):
+            work.measured[f] = abs(numbers.value(one.value)) if is_zero(numbers, one.value) else -1.0
 
     def step_in(self, mode: int, system: Any) -> float:
         return float(system[3].memo[LENGTH])

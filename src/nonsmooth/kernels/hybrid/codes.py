@@ -54,8 +54,8 @@ OPEN_RUN, LATE, CLOSED = 0, 1, 2
 
 RESET = 1  # of ``Net.transitions``, place 1: the states change (2: memory alone)
 DEAD_END = 2  # of place 2: behind it motion is not unique (3: there is none), and the run ends (1: a contact begins)
-# of place 4, where elements are asked: one decides alone; the system's own, without and with a reset; an answer
-ALONE, OWN, ASKS_BEHIND, ANSWER = 1, 2, 3, 4
+# of place 4, where elements are asked: one decides alone; the system's own, without and with a reset
+ALONE, OWN, ASKS_BEHIND = 1, 2, 3
 
 # Methods of the series stepper, and its places behind those of every march.
 TAYLOR, RKF45 = 0, 1

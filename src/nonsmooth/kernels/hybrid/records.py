@@ -158,7 +158,7 @@ class SeriesWork(NamedTuple):
     vals: Any
     near: Any
     scale: Any  # (indicators,) size so far
-    measured: Any  # (indicators,) of one that is zero: its rounding
+    measured: Any  # (indicators,) of one that is zero: its rounding; -1 of one that is not
     side: Any  # (indicators,) sign at the beginning of the step
     side_next: Any  # and at its end
     rise: Any  # (rows,) sign of the slope at the end of the step before

@@ -20,8 +20,9 @@ def snap(C, m, n, n_indicators, h, scale, measured, near, side):
     """After-limits: set what is zero within rounding to zero in the jets of the indicators, and find their signs.
 
     ``side`` becomes the sign of the first coefficient that does not vanish (0: the indicator vanishes identically).
-    ``measured`` is the size of indicators known to be zero here: their rounding error, seen. Others share its relative
-    size: where a stick ends, the speed begins with a slope that is the indicator that ended it. ``near`` are the first
+    ``measured`` is the size of indicators known to be zero here, their rounding error, seen; -1 of those known not to
+    be. Others share its relative size: where a stick ends, the speed begins with a slope that is the indicator that
+    ended it. ``near`` are the first
     coefficients with all that they are computed from off by about ``OFF``, which shows the size of their terms.
     """
     seen = 0.0
@@ -36,7 +37,7 @@ def snap(C, m, n, n_indicators, h, scale, measured, near, side):
             noise = max(noise, NOISE * terms) if terms < inf else noise
         for k in range(m + 1):
             c = C[n + i, k]
-            if fabs(c) * power > noise:
+            if fabs(c) * power > noise or (k == 0 and measured[i] < 0.0):
                 sign = 1 if c > 0.0 else -1
                 break
             C[n + i, k] = 0.0

@@ -4,7 +4,7 @@ from math import fabs, inf
 
 import nonsmooth.kernels.hybrid.codes as place
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.codes import ANSWER, MODE, TIME
+from nonsmooth.kernels.hybrid.codes import MODE, TIME
 from nonsmooth.kernels.series.crossing import NOISE, OFF, rows_hold, snap
 from nonsmooth.kernels.series.generated import jet_of, jump_of, values_of
 from nonsmooth.kernels.series.rkf45 import first_step
@@ -110,9 +110,6 @@ def take(i, t, fired, form, tables, net, work):
     for j in range(q.shape[0]):
         q[j] = work.q_new[j]
     mode = net.transitions[t, 0]
-    if net.transitions[t, 4] == ANSWER:  # what was asked there was zero by that measure
-        for k in range(net.meets_start[mode], net.meets_start[mode + 1]):
-            work.measured[net.meets[k]] = max(work.measured[net.meets[k]], TOGETHER * work.scale[net.meets[k]] / 4)
     look(i, form, tables, work, mode)
     if net.meets.shape[0] > 0:
         J = work.J0 if form.method == place.RKF45 else work.C

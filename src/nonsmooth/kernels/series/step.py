@@ -218,8 +218,7 @@ def make_step(i, form, net, section, wanted, work, r_max):
     if pending >= 0:
         part = x * h
         tally[place.LANDING] = 0
-        if rkf:
-            part = polished(form, work, net.rows[hit, 0], t, h, part)
+        part = polished(form, work, net.rows[hit, 0], t, h, part)
     if rkf:
         growth = min(5.0, 0.9 * float32(error) ** float32(-0.1)) if error > 1e-30 else 5.0
         work.usual[mode] = growth * h if growth < 1.0 else max(memo[place.PLANNED], growth * h)

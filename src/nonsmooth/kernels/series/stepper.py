@@ -97,10 +97,7 @@ def next_pass(form, section, work):
     if x == NONE or (tally[place.PENDING] >= 0 and x * h >= part * (1.0 - 1e-10)):
         return -1.0, 0
     memo[place.AHEAD] = x
-    tau = x * h
-    if form.method == place.RKF45:
-        tau = polished(form, work, s, memo[place.BASE], h, tau)
-    return tau, 1 if sense >= 0 else -1
+    return polished(form, work, s, memo[place.BASE], h, x * h), 1 if sense >= 0 else -1
 
 
 @once

@@ -132,6 +132,10 @@ class Assembler(ABC):
         """An expression behind an impulse, by the states before it."""
 
     @abstractmethod
+    def shifted_back(self, states: Any, expression: Any) -> Any:
+        """States moved to where an expression of those before them is zero, the shortest way; inputs stay."""
+
+    @abstractmethod
     def identity(self) -> Any:
         """The states themselves."""
 
@@ -205,6 +209,12 @@ class Assembler(ABC):
     def rate(self, k: int, mode: str) -> Any:
         """The rate that a constraint of element k holds at zero."""
         return self.parts[k].element.rate(self.place(k, mode, (0,) * len(self.parts)))
+
+    def meetings(self, mode: str, pattern: Pattern) -> list[tuple[int, Condition]]:
+        """The elements that may be held and are not, with each condition at which they meet what holds them."""
+        held = self.held(pattern)
+        free = [k for k, part in enumerate(self.parts) if part.element.held and k not in held]
+        return [(k, ways[0]) for k in free for ways in self.parts[k].element.meeting(self.place(k, mode, pattern))]
 
     def effects(self, some: Sequence[int], mode: str, parts: Sequence[Part] | None = None) -> list[list[Any]]:
         """Changes of the derivatives of the rates of some elements by their unit forces."""
@@ -349,7 +359,7 @@ class Assembler(ABC):
     def impact(self, some: tuple[int, ...], mode: str, factor: Any = None) -> Any:
         """States behind impulses of several elements that take their rates to -factor times these; without one, by the
         restitution of each, of ~k without any; then those of elements that have the number of all added, which take
-        their rates to zero.
+        their rates to zero and contacts onto their places.
 
         Of those that keep their rate at zero, as at rest, the rate is zero before it as well."""
         still = tuple(k - len(self.parts) for k in some if k >= len(self.parts))
@@ -358,11 +368,14 @@ class Assembler(ABC):
         some = tuple(max(k, ~k) for k in some)
         wanted = [-(1 + e) * self.rate(k, mode) for k, e in zip(some, factors, strict=True)]
         after = self.identity()
-        for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):
+        for k, amount in zip(some, self.solved(self.effects(some, mode), wanted) if some else [], strict=True):
             after = self.moved(after, self.parts[k], amount)
         rates = [(self.rate(k, mode), -e * self.rate(k, mode)) for k, e in zip(some, factors, strict=True)]
         after = self.held_exactly(after, rates, states=True)
-        return self.tidy(self.mapped(self.impact(still, mode, 0), after) if still else after)
+        after = self.mapped(self.impact(still, mode, 0), after) if still else after
+        for k in still:
+            after = self.shifted_back(after, self.parts[k].where) if self.parts[k].element.bears else after
+        return self.tidy(after)
 
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
         """The ways of element k out of its phase; those that it decides with others have none behind it."""

@@ -186,12 +186,7 @@ def _written_out(
 
 def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
     """The condition whose parts vanish where an element that is not held meets its own."""
-    held = make.held(pattern)
-    rows = []
-    for k, part in enumerate(make.parts):
-        if part.element.held and k not in held:
-            rows += [make.condition(ways[:1], part.name) for ways in part.element.meeting(make.place(k, mode, pattern))]
-    return " and ".join(rows)
+    return " and ".join(make.condition([one], make.parts[k].name) for k, one in make.meetings(mode, pattern))
 
 
 def _decide_together(make: Expressions, base: Mapping[str, Any], resets: bool) -> bool:

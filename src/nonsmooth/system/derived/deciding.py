@@ -40,7 +40,7 @@ ORDERS = 24  # derivatives that are looked at where all before are zero
 class Outcome:
     """The phases behind an instant and the states there; the contacts that bore an impulse, ~k for a contact k that
     gave back nothing of its approach although it has a restitution, and with the number of elements added those that
-    hold from then on although their rate behind the impact was not zero, but slow.
+    hold from then on although their rate behind the impact was not zero, but slow, or although they bore no impulse.
 
     ``rubbed``: of an impact that rubs the elements that bore impulses, and the derivatives of these in their rates;
     ``ends`` and ``names``: the status of a run that cannot go on, and the elements for which it cannot."""
@@ -130,8 +130,9 @@ class _Instant(Instant):
         at = {k for k in self.frictions if self.places[k] == 0.0 and self.parts[k].where is not self.rates[k]}
         self._set_to_zero([self.parts[k].where for k in candidates if self.pressed.get(k) or k in at], None)
         self._set_to_zero([self.rates[k] for k in candidates], candidates)
-        if struck and slow:
-            struck += tuple(len(self.parts) + k for k in self._independent([*slow, *candidates]))
+        landed = [k for k in candidates if self.pressed.get(k) and k not in self.still and not {k, ~k} & {*struck}]
+        if (struck and slow) or landed:
+            struck += tuple(len(self.parts) + k for k in self._independent([*slow, *landed, *candidates]))
         return Outcome(self.pattern, self.numbers.u.copy(), struck, self.rubbed)
 
     def _meets(self, k: int) -> bool:

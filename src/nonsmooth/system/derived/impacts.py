@@ -31,6 +31,11 @@ ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
 ROUNDS = 10_000  # of impacts one after the other
 
 
+def is_zero(numbers: Numbers, expression: Any) -> bool:
+    """Return whether the value of an expression is rounding of its terms."""
+    return abs(numbers.value(expression)) <= ZERO * numbers.terms(expression)
+
+
 class Instant:
     """One instant: what elements are asked there, with what counts as zero, and their impacts."""
 
@@ -61,8 +66,7 @@ class Instant:
 
     def number(self, expression: Any) -> float:
         """The value of an expression, 0 where it is rounding."""
-        total = self.numbers.value(expression)
-        return total if abs(total) > ZERO * self.numbers.terms(expression) else 0.0
+        return 0.0 if is_zero(self.numbers, expression) else self.numbers.value(expression)
 
     def place(self, k: int) -> Place:
         return self.make.place(k, self.mode, self.pattern)

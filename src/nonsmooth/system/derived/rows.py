@@ -201,6 +201,12 @@ class Rows(Assembler):
         found[:, self.n :] += states[:, self.n :]
         return found
 
+    def shifted_back(self, states: FloatArray, expression: Row) -> FloatArray:
+        slopes = expression.values[: self.n].copy()
+        slopes[[*self.inputs]] = 0.0
+        found: FloatArray = states - np.outer(slopes / (slopes @ slopes), expression.values)
+        return found
+
     def solved(self, matrix: list[list[float]], right: list[Any]) -> list[Row]:
         rows = [one.values if isinstance(one, Row) else np.zeros(self.field.shape[1]) for one in right]
         try:

@@ -257,8 +257,7 @@ class Place:
 
     def back_on(self, states: Any) -> Any:
         """States moved onto the surface of the contact, the shortest way; inputs stay."""
-        expressions: Any = self.make  # where nothing is asked: rows always are
-        return expressions.shifted_back(states, self.where)
+        return self.make.shifted_back(states, self.where)
 
     def is_turned(self) -> bool:
         """Return whether the impact of a stop, or an input, may turn its speed at once."""
