@@ -94,6 +94,18 @@ def test_an_unknown_at_its_bound_is_said_to_be_there(bounds: tuple[Any, float], 
     assert "readings of x" in plain().identifiability["a"]
 
 
+@pytest.mark.parametrize("bounds", [(2.3, 3.0), (1.0, 1.7)])
+def test_beside_an_unknown_at_its_bound_the_other_is_the_best_there(bounds: tuple[float, float]) -> None:
+    """x' = a and y' = a + b: with a held, b is the slope of y less it, as if x had not been read."""
+    modes = {"m": lambda t, u, p: (p.a, p.a + p.b)}
+    system = ns.System(states=["x", "y"], parameters={"a": sum(bounds) / 2, "b": 1.0}, modes=modes)
+    both = readings().assign(y=readings(seed=3, x0=0.0, a=2.5)["x"])
+    slope, end = regression(readings(seed=3, x0=0.0, a=2.5))[0][0], min(bounds, key=lambda one: abs(one - 2.0))
+    found = ns.fit(system, both, {"a": bounds, "b": None}, measured=["x", "y"], progress=False)
+    assert found["a"] == end
+    assert found["b"] == pytest.approx(slope - end, abs=1e-6)
+
+
 def test_a_sensor_shows_gain_times_the_state_and_an_offset() -> None:
     """3 (x - ...) + 0.5: slope and start of the state are those of the reading over the gain, less the offset."""
     data = readings()
