@@ -121,6 +121,8 @@ def mutants(path: Path) -> Iterator[Mutant]:
             continue
         _put(node, name, i, new)
         changed = ast.unparse(new if owner is old else owner)
+        if lines[owner.lineno - 1].lstrip().startswith("elif "):
+            changed = "el" + changed  # unparsed, the rest of a chain begins one of its own
         _put(node, name, i, old)
         begin, end = owner.lineno, owner.end_lineno or owner.lineno
         margin = lines[begin - 1][: owner.col_offset]
