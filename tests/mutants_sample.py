@@ -47,7 +47,7 @@ SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, as
 LOOKS = {  # of a mark: how thick, large, pale, far from its neighbour; and which line a warning names
     *("alpha", "elinewidth", "fontsize", "labelpad", "linewidth", "linewidths", "lw", "markersize", "markeredgewidth"),
     *("columnspacing", "fill_alpha", "handlelength", "handletextpad", "line_alpha", "line_width", "ms"),
-    *("mutation_scale", "pad", "rasterized", "stacklevel", "zorder"),
+    *("hspace", "mutation_scale", "pad", "rasterized", "stacklevel", "width_ratios", "wspace", "zorder"),
 }
 NO_ANSWER = {"default_rng", "bar", "progress_bar"}  # a seed that stands there is one of many; bars of progress
 FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]
@@ -81,8 +81,8 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", in
         for i, child in enumerate(value) if isinstance(value, list) else [(-1, value)]:
             if not isinstance(child, ast.AST) or isinstance(child, SILENT) or _is_text(child):
                 continue
-            # strict= asserts lengths, total= is for the checker of types.
-            if isinstance(child, ast.keyword) and child.arg in LOOKS | {"strict", "total"}:
+            # strict= asserts lengths, total= is for the checker of types, progress= shows a bar.
+            if isinstance(child, ast.keyword) and child.arg in LOOKS | {"strict", "total", "progress"}:
                 continue
             if isinstance(child, ast.Call) and ast.unparse(child.func).rpartition(".")[2] in NO_ANSWER:
                 continue
@@ -121,6 +121,8 @@ def mutants(path: Path) -> Iterator[Mutant]:
             continue
         _put(node, name, i, new)
         changed = ast.unparse(new if owner is old else owner)
+        if lines[owner.lineno - 1].lstrip().startswith("elif "):
+            changed = "el" + changed  # unparsed, the rest of a chain begins one of its own
         _put(node, name, i, old)
         begin, end = owner.lineno, owner.end_lineno or owner.lineno
         margin = lines[begin - 1][: owner.col_offset]

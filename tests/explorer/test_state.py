@@ -76,6 +76,7 @@ def test_every_model_has_a_first_view_and_the_paper_all_its_figures() -> None:
         for parameter, value in state.values.items():
             low, high = slider_range(value)
             assert low <= value <= high, parameter
+            assert not value or slider_range(1e3 * value) == pytest.approx((1e3 * low, 1e3 * high))  # in any unit
     presets = presets_of(FIRST.model)
     assert {name.split()[1] for name in presets} == {"9", "10", "11", "12", "13", "14", "15", "17", "18"}
     figure = presets["Fig. 13"]

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import xarray as xr
 
 pytest.importorskip("bokeh", reason="the explorer needs bokeh")
 
@@ -110,6 +111,20 @@ def test_only_what_is_shown_is_asked_for(page: Page) -> None:
     assert "first look" not in page.wanted() and "diagram" in page.wanted()
     page.past.put(replace(page.state, upper="chart"))
     assert not {"diagram", "first look"} & set(page.wanted())
+
+
+def test_what_follows_from_a_motion_is_asked_for_of_the_motion_that_is_there(page: Page) -> None:
+    """Its exponents, by its period number: not before it is there, nor of other values until theirs is."""
+    alone, known = set(page.wanted()), page.sheet.views["portrait"].results
+    page.work.done["orbit"] = key_of(page.wanted()["orbit"])
+    assert set(page.wanted()) == alone
+    judged = xr.Dataset({"period_number": ("parameter", [3])})
+    known.update(run=xr.Dataset(coords={"time": [2.0, 7.0]}), judged=judged)
+    more = [asked for stage, asked in page.wanted().items() if stage not in alone]
+    assert more and all((asked["period"], asked["span"]) == (3, 5.0) for asked in more)
+    page.past.put(replace(page.state, values={**page.state.values, "rho": 0.31}))
+    assert set(page.wanted()) == alone
+    known.clear()
 
 
 def test_a_message_that_is_none_says_so_and_changes_nothing(page: Page) -> None:

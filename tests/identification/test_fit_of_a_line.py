@@ -41,7 +41,7 @@ def plain(seed: int = 2) -> Any:
 def test_slope_start_and_noise_are_those_of_regression() -> None:
     (a, x0), _, scatter = regression(readings())
     found = plain()
-    assert found["a"] == pytest.approx(a, rel=1e-7)
+    assert found["a"] == pytest.approx(a, rel=1e-7) and "readings of x" in found.identifiability["a"]
     assert found.extra["x(0)"].value == pytest.approx(x0, rel=1e-6)
     assert found.extra["x.noise"].value == pytest.approx(scatter, rel=1e-6)
 
@@ -85,13 +85,18 @@ def test_a_value_known_before_is_weighed_by_its_precision(centre: float, error: 
     assert found.estimate("a").uncertainty == pytest.approx(weight.sum() ** -0.5, rel=0.3)
 
 
-@pytest.mark.parametrize(("bounds", "end"), [((1.0, 1.8), 1.8), ((None, 1.7), 1.7)])
-def test_an_unknown_at_its_bound_is_said_to_be_there(bounds: tuple[Any, float], end: float) -> None:
-    found = ns.fit(line(), readings(), {"a": bounds}, progress=False)
+@pytest.mark.parametrize(("bounds", "end"), [((2.3, 3.0), 2.3), ((1.0, 1.7), 1.7), ((None, 1.7), 1.7)])
+def test_beside_an_unknown_at_its_bound_the_other_is_the_best_there(bounds: tuple[Any, float], end: float) -> None:
+    """x' = a and y' = a + b: with a held, b is the slope of y less it, as if x had not been read."""
+    modes = {"m": lambda t, u, p: (p.a, p.a + p.b)}
+    guess = 2.5 if end == bounds[0] else 1.5
+    system = ns.System(states=["x", "y"], parameters={"a": guess, "b": 1.0}, modes=modes)
+    y = readings(seed=3, x0=0.0, a=2.5)
+    (slope, _), _, _ = regression(y)
+    both = readings().assign(y=y["x"])
+    found = ns.fit(system, both, {"a": bounds, "b": None}, measured=["x", "y"], progress=False)
     assert found["a"] == end and "at its bound" in found.identifiability["a"]
-    low = ns.fit(line().with_parameters(a=2.5), readings(), {"a": (2.3, 3.0)}, progress=False)
-    assert low["a"] == 2.3 and "at its bound" in low.identifiability["a"]
-    assert "readings of x" in plain().identifiability["a"]
+    assert found["b"] == pytest.approx(slope - end, abs=1e-6)
 
 
 def test_a_sensor_shows_gain_times_the_state_and_an_offset() -> None:

@@ -96,6 +96,7 @@ def test_records_and_a_response_add_their_information() -> None:
     assert np.diag(found.covariance.values) == pytest.approx(np.diag(np.linalg.inv(added)), rel=0.3)
     assert found.estimate("F").uncertainty < 0.85 * curve.estimate("F").uncertainty
     assert len(found.residuals["sample"]) == 400 and len(found.steady["sample"]) == len(OMEGA)
+    assert found.steady["measured"].long_name == "amplitude"
 
 
 def swept(system: ns.System, at: Any, state: str = "x") -> xr.Dataset:
@@ -133,6 +134,7 @@ def test_sections_of_doubled_motions() -> None:
         found = ns.fit(system.with_parameters(k=8.5, k_s=1150.0), data, ["k", "k_s"], progress=False)
         assert [found["k"], found["k_s"]] == pytest.approx([8.47, 1210.0], rel=1e-6)
     steady = found.steady
+    assert steady["measured"].long_name == "section"
     assert set(steady["iterate"].values.tolist()) == {0, 1, 2, 3}
     means = data.sizes["iterate"] / sweep["period_number"].sel(rho=steady["rho"].values).values
     error = np.where(steady["quantity"].values == 0, 2e-5, 2e-4) / np.sqrt(means)

@@ -212,7 +212,7 @@ def many() -> xr.Dataset:
     off = np.random.default_rng(0).normal(size=(40, 3))
     over = ("rig", "parameter")
     return xr.Dataset(
-        {"truth": (over, 0 * off), "estimate": (over, off), "uncertainty": (over, 1 + 0 * off)},
+        {"truth": (over, 3 + 0 * off), "estimate": (over, 3 + 2 * off), "uncertainty": (over, 2 + 0 * off)},
         {"parameter": ["k", "c", "c_s"]},
         SYNTHETIC,
     )
@@ -339,6 +339,12 @@ def test_numbers_are_written_with_their_errors() -> None:
 def test_the_grid_of_the_transform_is_shown() -> None:
     """A record of 20.48 s has lines 0.0488 Hz apart: 0.7324 Hz is the paper's 4.60 rad/s."""
     assert "largest line 0.7324 Hz, half a step to each side" in words(identification.impulse_response(decay()))
+
+
+def test_errors_of_rigs_are_drawn_in_units_of_their_uncertainties() -> None:
+    off, ax = np.random.default_rng(0).normal(size=(40, 3)), identification.coverage(many())
+    heights = np.concatenate([line.get_ydata() for line in ax.lines if line.get_marker() == "."])
+    assert np.sort(heights) == pytest.approx(np.sort(off.ravel()))
 
 
 def test_a_calibration_says_where_its_line_begins() -> None:

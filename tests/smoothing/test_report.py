@@ -110,14 +110,20 @@ def test_exponents_of_chaos_are_those_of_long_runs() -> None:
 
 
 def test_counterparts_are_the_nearest_of_the_same_period() -> None:
-    def found(number: int, high: float) -> FoundAttractor:
-        return FoundAttractor(number, np.array([[high, 1.0], [-1.0, -1.0]]))
+    def found(number: int, high: float, low: float = -1.0) -> FoundAttractor:
+        return FoundAttractor(number, np.array([[high, 1.0], [low, -1.0]]))
 
-    assert matched([found(1, 1.0), found(2, 2.0)], [found(2, 2.01), found(1, 1.02)]) == (0, 0)
-    assert matched([found(1, 1.0)], [found(1, 1.5)]) == (1, 1)
-    assert matched([found(1, 1.0)], [found(2, 1.0)]) == (1, 1)
-    assert matched([found(1, 1.0), found(1, 1.05)], [found(1, 1.04)]) == (1, 0)
-    assert matched([], [found(1, 1.0)]) == (0, 1)
+    def apart(own: list[FoundAttractor], others: list[FoundAttractor]) -> tuple[int, int]:
+        return matched(own, others, np.array([1e-3, 1.0]))
+
+    assert apart([found(1, 1.0), found(2, 2.0)], [found(2, 2.01), found(1, 1.02)]) == (0, 0)
+    assert apart([found(1, 1.0)], [found(1, 1.5)]) == (1, 1)
+    assert apart([found(1, 1.0)], [found(2, 1.0)]) == (1, 1)
+    assert apart([found(1, 1.0), found(1, 1.05)], [found(1, 1.04)]) == (1, 0)
+    assert apart([], [found(1, 1.0)]) == (0, 1)
+    # the first state at rest: in the size that it has in its system
+    assert apart([found(1, 2e-3, 2e-3)], [found(1, 2.05e-3, 2.05e-3)]) == (0, 0)
+    assert apart([found(1, 2e-3, 2e-3)], [found(1, 4e-3, 4e-3)]) == (1, 1)
 
 
 def test_what_cannot_be_reported_is_refused() -> None:

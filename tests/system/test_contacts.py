@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.linalg import block_diag, expm
 from scipy.optimize import brentq
 
 import nonsmooth as ns
@@ -278,6 +279,35 @@ def test_a_preloaded_spring_holds_and_lets_go() -> None:
     run = ns.simulate(still, start={"v_q": 0.0}, duration=20)
     assert not run["u"].values.any()
     assert run["p_force"].values == pytest.approx(-0.3 * np.sin(run["time"].values), abs=1e-14)
+
+
+@pytest.mark.parametrize("c", [0.5, -0.5])
+@pytest.mark.parametrize("rubbing", [False, True])
+def test_one_breaks_away_and_the_damper_between_them_decides_about_the_other(c: float, rubbing: bool) -> None:
+    """M = [[2, 1], [1, 2]] at rest under loads 3 and -.5 with bounds 2 and 1: the first breaks away with a1 = 1/2, and
+    the force .5 + a1 - c v1 on the second is at its bound, from which the damper takes it (c > 0) or drives it on. Its
+    damper to the ground does nothing to what rests, and would decide if forces of this instant were a little others. A
+    block that rests on a floor with friction beside them changes nothing: all combinations are tried then."""
+    M, C, t = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([[c, -c], [-c, c + 5.0]]), 0.5
+    elements: Any = {"a": Coulomb(at="q1", friction=2.0), "b": Coulomb(at="q2", friction=1.0)}
+    loads: Any = {"q1": lambda t, p: 3.0, "q2": lambda t, p: -0.5}
+    masses, dampers = M, C
+    if rubbing:
+        masses, dampers = block_diag(M, np.eye(2)), block_diag(C, np.zeros((2, 2)))
+        elements |= {"floor": Stop(at="q4", side=-1, friction=0.3, tangent="q3")}
+        loads |= {"q4": lambda t, p: -9.81}
+    system = ns.mechanical(masses, dampers, 0 * dampers, parameters={}, forcing=loads, elements=elements)
+    moving = M, C, [1.0, 0.5]  # the speeds follow M a + C v = loads less frictions
+    held = M[:1, :1], C[:1, :1], [1.0]
+    inertia, damping, load = held if c > 0 else moving
+    n = len(load)
+    A = np.zeros((n + 1, n + 1))
+    A[:n] = np.linalg.solve(inertia, np.column_stack([-damping, load]))
+    exact = np.append(expm(t * A)[:n, n], np.zeros(2))
+    run = ns.simulate(system, duration=t)
+    speeds = end(run)[len(masses) :]
+    assert not run.sizes["crossing"]  # a wrong decision would be taken back at once
+    assert speeds == pytest.approx([*exact[:2], *np.zeros(len(masses) - 2)], abs=1e-12)
 
 
 # Modes, resets and memory of the system's own beside elements that decide together

@@ -196,8 +196,8 @@ def test_a_field_may_be_given_for_the_surface():
     equivalent = utkin(lambda t, u, p: (0.0, 0.04 - u.y)).traced.fields[2]
     assert same(equivalent[0], -x)
     assert same(equivalent[1], sp.Float(0.04) - y)
-    with pytest.raises(SystemDefinitionError, match="leaves the surface 'h'.* rate '1/2'"):
-        utkin(lambda t, u, p: (0.5, -u.y))
+    with pytest.raises(SystemDefinitionError, match="leaves the surface 'h'.* rate '1'"):
+        utkin(lambda t, u, p: (1.0, -u.y))
 
 
 def test_a_surface_is_kept_as_text():

@@ -291,6 +291,7 @@ def test_surfaces_are_kept_for_sliding():
         "slip_left -> slip_right",
         "slip_right -> slip_left",
     ]
+    assert [jump.contact for jump in system.declared.transitions] == [True, False]  # the first leaves the first mode
     assert system.modes == ("slip_left", "slip_right", "slip_sliding")
     assert "crossed or slid on" in repr(system)
     assert system.smoothed(1e-3).surfaces == ()

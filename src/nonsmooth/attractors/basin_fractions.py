@@ -24,7 +24,6 @@ from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import at_least, swept_values
 
@@ -85,8 +84,6 @@ def basin_fractions(
     """
     asked = as_called(locals())
     numbers = swept_values(system, parameter, values)
-    # a start is named, state by state; of each run at each value a row is kept
-    room_for((500.0 + 64.0 * len(numbers)) * n_starts, f"{n_starts:.6g} starts at {len(numbers)} values", "take fewer")
     starts = start_states(system, _starts(system, box, n_starts, seed))
     settler, chunk = settler_of(system, "basin_fractions", options)
     asked["values"], points = numbers, system.parameter_points({parameter: numbers})

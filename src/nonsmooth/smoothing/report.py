@@ -69,14 +69,14 @@ def attractors_of(system: System, search: Box, parameter: str, value: float) -> 
     ]
 
 
-def matched(own: Sequence[FoundAttractor], others: Sequence[FoundAttractor]) -> tuple[int, int]:
+def matched(own: Sequence[FoundAttractor], others: Sequence[FoundAttractor], scale: Any) -> tuple[int, int]:
     """Numbers of attractors without a counterpart: of the first, of the others.
 
-    Pairs are taken in the order of their distances."""
+    Pairs are taken in the order of their distances; ``scale``: sizes of states in which none of them moves."""
     if not own or not others:
         return len(own), len(others)
     size = np.max([one.extremes[0] - one.extremes[1] for one in (*own, *others)], axis=0)
-    size = np.where(size > 0, size, 1.0)
+    size = np.where(size > 0, size, scale)
     pairs = sorted(
         (float(np.abs((a.extremes - b.extremes) / size).max()), i, j)
         for i, a in enumerate(own)
@@ -259,7 +259,8 @@ class _Sharp:
             row |= {"status": _code(error), "note": str(error)}
         if self.search is not None:
             others = attractors_of(smooth, self.search, "eta", eta)
-            row["n_attractors"], row["missing"], row["spurious"] = len(others), *matched(self.own, others)
+            apart = matched(self.own, others, self.system.scale_vector())
+            row["n_attractors"], row["missing"], row["spurious"] = len(others), *apart
         return row | ({} if found is None else self.of(found)), near
 
 

@@ -84,8 +84,8 @@ def _interpolated(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset:
     from scipy.interpolate import CubicSpline
 
     time, segment = run["time"].values, run["segment"].values
-    own = segment[np.searchsorted(time, instants, side="right") - 1]
     nearest = np.searchsorted(time, instants, side="right") - 1
+    own = segment[nearest]
     found = run.isel(time=nearest).assign_coords(time=("time", instants, dict(run["time"].attrs)))
     for name, array in run.data_vars.items():
         if "time" not in array.dims or array.dtype.kind != "f":
@@ -96,8 +96,7 @@ def _interpolated(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset:
             rows, at = np.flatnonzero(segment == k), own == k
             rows = rows[np.append(True, np.diff(time[rows]) > 0)]
             if len(rows) > 1:
-                ends = "natural" if len(rows) < 4 else "not-a-knot"
-                spline = CubicSpline(time[rows], np.nan_to_num(values[rows]), bc_type=ends)
+                spline = CubicSpline(time[rows], np.nan_to_num(values[rows]))
                 new[at] = np.where(np.isnan(values[rows[0]]), np.nan, spline(instants[at]))
         found[name] = (("time", *[d for d in array.dims if d != "time"]), new, dict(array.attrs))
     return found

@@ -117,8 +117,7 @@ class Chart(CellImage):
         """Exponents of another range are of no use."""
         subject = {key: value for key, value in job.items() if key != "view"}
         if subject != self._subject:
-            self.results.clear()
-            self._subject = subject
+            self.results, self._subject = dict(found), subject
         if job["view"] != "exponents":
             self._stage = job["view"]
         super().show(job, found)

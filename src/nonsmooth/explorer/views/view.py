@@ -100,8 +100,7 @@ class View:
         """Make the figure."""
 
     def show(self, job: Request, found: Mapping[str, Any]) -> None:
-        """Take results, and draw them."""
-        self.results.update(found)
+        """Draw results, which the sheet has kept."""
         self.redraw()
 
     def redraw(self) -> None:

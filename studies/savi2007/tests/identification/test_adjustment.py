@@ -116,6 +116,7 @@ def test_a_parameter_set_goes_through_a_file_and_draws_what_it_says(tmp_path):
     assert np.all(drawn["c_s"] > 0)
     assert drawn["k"].std() == pytest.approx(0.1, rel=0.03)
     assert np.log(drawn["c_s"]).std() == pytest.approx(0.2 / 0.6, rel=0.03)
+    assert np.corrcoef(drawn["k"], np.log(drawn["c_s"]))[0, 1] == pytest.approx(0.004 / (0.1 * 0.2), abs=0.03)
     assert list(given.covariance["parameter"].values) == ["k", "c_s"]
 
 
