@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -51,15 +52,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank.get(item.path, len(FIRST)))
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Any:
+    """Collect without looking for garbage (a quarter of the time): all of it stays, and is not looked through later."""
+    gc.disable()
+    found = yield
+    gc.enable()
+    gc.freeze()
+    return found
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """A file is one worker's, and so are all files that share the quick reproduction (20 s)."""
+    """A file is one worker's, and so are all that share the quick reproduction (20 s), and a server and a browser."""
     from xdist.scheduler import LoadFileScheduling
 
     class ByFile(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return "study" if "tests/test_savi2007" in file else file
+            shared = (name for name in ("tests/test_savi2007", "tests/explorer/") if name in file)
+            return next(shared, file)
 
     return ByFile(config, log) if config.getvalue("dist") == "loadfile" else None
 

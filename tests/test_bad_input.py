@@ -445,7 +445,7 @@ def test_ctrl_c_in_a_long_sweep(tmp_path: Path) -> None:
     assert work.stdout is not None
     for _ in before:
         assert work.stdout.readline() == "running\n"
-        time.sleep(0.5)
+        time.sleep(0.2)
         work.send_signal(signal.SIGINT)
         assert work.stdout.readline() == "130\n"
     out, err = work.communicate(timeout=600)

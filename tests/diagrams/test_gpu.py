@@ -6,54 +6,28 @@ types that are compiled are those with which the simulated run launched the kern
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 import json
 import os
 import re
 import subprocess
 import sys
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from gpu_compiler import compiled, run
 
 import nonsmooth as ns
-from nonsmooth.kernels.compile.assembly import LINEAR_STEPPER
-from nonsmooth.kernels.compile.sources import reached
-from nonsmooth.kernels.cuda import module
-from nonsmooth.kernels.cuda.module import OBSERVERS, joined, stamp
 
 COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
 pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed (extra `test`, Linux only)")
 SCRIPT = Path(__file__).with_name("gpu_script.py")
 SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "1")  # 0: a real GPU (CONTRIBUTING)
 
-COMPILE = """
-import functools, gc, json, sys
-import numba.cuda
-from nonsmooth.kernels.cuda.module import ptx_of
-
-gc.disable()  # a compile makes millions of objects and hardly a cycle
-found, opt, kernels = {}, *json.load(sys.stdin)
-numba.cuda.compile = functools.partial(numba.cuda.compile, opt=opt)
-for name, signature in kernels.items():
-    text = ptx_of(name, signature, (1, 2, 2, 1, 2, 5))
-    found[name] = [text.count(".visible .entry"), ".target sm_90" in text]
-print(json.dumps(found))
-"""
 ENTRIES = {"tabulate", "beside", "measure", "decide", "frames", "advance", "neighbours"}
 LONG = {"frames", "neighbours"}  # the loop of ``advance`` again, with other observers: 34 s of a processor
-
-
-def run(code: list[str], given: str = "", **environment: str) -> str:
-    done = subprocess.run(
-        [sys.executable, *code], input=given, capture_output=True, text=True, env={**os.environ, **environment}
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -128,20 +102,9 @@ def test_spectra_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
     ids=["most", "all optimised"],
 )
 def test_every_kernel_compiles_for_the_types_it_is_launched_with(
-    simulated: dict[str, Any], entries: set[str], optimised: bool, request: pytest.FixtureRequest
+    simulated: dict[str, Any], entries: set[str], optimised: bool
 ) -> None:
-    """Twenty seconds, so not again for the same texts, types and compiler. Without optimising it refuses the same."""
-    given = json.dumps([optimised, {name: simulated["launched"][name] for name in sorted(entries)}])
-    compiler = [version(name) for name in ("numba-cuda", "nvidia-nvvm", "llvmlite")]
-    texts = [joined((*LINEAR_STEPPER, *parts)) for parts in OBSERVERS.values()]
-    texts += [stamp(), Path(module.__file__).read_text(), *(reached(text) for text in texts)]
-    key = hashlib.sha256(repr([given, compiler, texts]).encode()).hexdigest()
-    cache = getattr(request.config, "cache", None)  # there is none where pytest was told so
-    if cache and cache.get(f"gpu/{optimised}", "") == key:
-        return
-    assert json.loads(run(["-c", COMPILE], given)) == {name: [1, True] for name in entries}
-    if cache:
-        cache.set(f"gpu/{optimised}", key)
+    compiled("linear", {name: simulated["launched"][name] for name in sorted(entries)}, optimised)
 
 
 def test_the_benchmark_compares_both_devices() -> None:

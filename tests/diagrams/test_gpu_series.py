@@ -9,13 +9,12 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from gpu_compiler import compiled, run
 from gpu_series_systems import START, TOP, two_wells
 
 import nonsmooth as ns
@@ -24,41 +23,8 @@ COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda"
 pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed (extra `test`, Linux only)")
 FOLDER = Path(__file__).parent
 
-COMPILE = """
-import functools, gc, json, sys
-import numba.cuda
-import nonsmooth as ns
-from gpu_series_systems import filtered, two_wells
-from nonsmooth.flow.engines.devices import engine_on_gpu
-from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.engines.gpu import module_of
-from nonsmooth.kernels.cuda.module import ptx_of_module
-
-gc.disable()  # a compile makes millions of objects and hardly a cycle
-name, signatures = json.load(sys.stdin)
-optimised = name.removesuffix(", typed") == name
-name = name.removesuffix(", typed")
-numba.cuda.compile = functools.partial(numba.cuda.compile, opt=optimised)
-system = {"valve": ns.models.relief_valve, "two wells": two_wells, "filtered": filtered}[name]()
-engine = engine_on_gpu(engine_for(system, "auto" if name == "filtered" else "taylor", None, None), None)
-module = module_of(engine, engine.prepare(system.parameter_vector()[None, :]))
-texts = [ptx_of_module(module, entry, signature) for entry, signature in signatures.items()]
-print(json.dumps([[text.count(".visible .entry"), ".target sm_90" in text] for text in texts]))
-"""
 SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "1")  # 0: a real GPU (CONTRIBUTING)
 ENTRIES = {"advance", "beside", "measure", "contract", "decide", "separated"}
-
-
-def run(code: list[str], given: str = "", **environment: str) -> str:
-    done = subprocess.run(
-        [sys.executable, *code],
-        input=given,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(FOLDER)]), **environment},
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -124,15 +90,16 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
 
 @pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
 @pytest.mark.parametrize(
-    "name",
+    ("name", "optimised"),
     [
-        "valve, typed",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("valve", "two wells", "filtered")),
+        ("valve", False),
+        *(pytest.param(name, True, marks=pytest.mark.slow) for name in ("valve", "two wells", "filtered")),
     ],
 )
-def test_the_kernels_compile_for_the_types_they_are_launched_with(simulated: dict[str, Any], name: str) -> None:
-    printed = run(["-c", COMPILE], json.dumps([name, simulated["launched"]]))
-    assert json.loads(printed.splitlines()[-1]) == [[1, True]] * len(ENTRIES)
+def test_the_kernels_compile_for_the_types_they_are_launched_with(
+    simulated: dict[str, Any], name: str, optimised: bool
+) -> None:
+    compiled(name, simulated["launched"], optimised)
 
 
 def test_no_kernel_is_left_out(simulated: dict[str, Any]) -> None:

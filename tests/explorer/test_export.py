@@ -119,11 +119,7 @@ def test_a_system_of_ones_own_and_a_smoothed_one_are_written_whole(results: dict
     same(study.with_suffix(".nc"), made)
 
 
-def test_a_motion_moves_in_a_file_and_other_views_say_that_they_do_not(results: dict[str, Any], tmp_path: Path) -> None:
-    from PIL import Image
-
-    with Image.open(write(tmp_path, "portrait", "gif", results)) as picture:
-        assert picture.n_frames == 60
+def test_views_that_do_not_move_in_a_file_say_so(results: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="'Phase plane' and 'Time history'"):
         exported("diagram", "gif", results, STATE)
 
@@ -145,6 +141,8 @@ def test_what_has_no_table_in_a_study_file_is_saved_as_the_script_that_makes_it(
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("py", "toml")])
 def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) -> None:
+    from PIL import Image
+
     begins = {
         "pdf": b"%PDF",
         "png": b"\x89PNG",
@@ -153,10 +151,13 @@ def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) ->
         "gif": b"GIF8",
         "html": b"<!doctype",
     }[kind]
-    path = write(tmp_path, "history", kind, results)
+    path = write(tmp_path, "portrait" if kind == "gif" else "history", kind, results)
     assert path.read_bytes().startswith(begins)
     if kind == "nc":
         same(path, results["run"])
+    if kind == "gif":
+        with Image.open(path) as picture:
+            assert picture.n_frames == 60
     if kind == "html":
         assert "<script>" in path.read_text()  # it moves
 

@@ -243,17 +243,3 @@ def test_numbers_that_no_form_of_ours_has_are_refused(page: Any) -> None:
         assert page.value("rho") == 0.45
         page.write("v-p.rho", "0.45")
         page.until('!document.getElementById("wrong-p.rho").textContent')
-
-
-def test_what_is_seen_is_saved_in_motion(page: Any, tmp_path: Any) -> None:
-    from PIL import Image
-
-    page.until_done()
-    page.tab.select_option("#save-view", "history")
-    page.tab.select_option("#save-kind", "gif")
-    with page.tab.expect_download() as download:
-        page.tab.click("#save")
-    assert download.value.suggested_filename == "discontinuous_support_history.gif"
-    download.value.save_as(tmp_path / "run.gif")
-    with Image.open(tmp_path / "run.gif") as picture:
-        assert picture.n_frames == 60
