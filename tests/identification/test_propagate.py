@@ -215,6 +215,25 @@ def test_a_number_of_a_function_and_bounds() -> None:
     np.testing.assert_array_equal(array["value_quantiles"], band["value_quantiles"])
 
 
+def test_the_band_of_a_run_is_that_of_each_instant_whenever_the_draws_have_their_impacts() -> None:
+    """A ball that falls from 1/2 and rebounds at 1 / sqrt(g): x = 1/2 - g t^2 / 2 before, and after it with e = 1/2."""
+    ball = ns.System(
+        states=["x", "v"],
+        parameters={"g": 1.0},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        elements={"floor": ns.elements.Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}, restitution=0.5)},
+    )
+    options = {"duration": 1.7, "start": {"x": 0.5}, "samples": [0.0, 0.5, 0.99, 1.01, 1.5, 1.7]}
+    band = ns.propagate({}, ns.simulate, ball, settings={"g": (1.0, 0.05)}, draws=60, progress=False, **options)
+    g, t = band["drawn_g"].values, band["time"].values[:, None]
+    at = 1 / np.sqrt(g)
+    exact = np.where(t < at, 0.5 - g * t**2 / 2, 0.5 * (t - at) * g * at - g * (t - at) ** 2 / 2)
+    sampled = np.isin(t[:, 0], options["samples"])
+    expected = np.quantile(exact, [0.025, 0.5, 0.975], axis=1)[:, sampled]
+    assert np.abs(band["u_quantiles"].sel(state="x").values[:, sampled] - expected).max() < 1e-9
+    assert np.allclose(band["u_share"].sel(state="x").values, np.where(sampled, 1.0, 0.0))  # its own impact is nobody's
+
+
 def test_draws_that_fail_are_counted() -> None:
     s = support()
 

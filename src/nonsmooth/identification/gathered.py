@@ -45,8 +45,8 @@ class Gathered:
 
     def add(self, result: xr.Dataset) -> None:
         """Keep what a draw gave."""
-        same = [name for name in self.plain if name in result and result[name].shape == self.centre[name].shape]
-        row = {name: result[name].values for name in same}
+        there = {name: _at_same(self.centre[name], result[name]) for name in self.plain if name in result}
+        row = {name: array.values for name, array in there.items() if array.shape == self.centre[name].shape}
         if self.along:
             row |= _along_sheets(self.centre, result, self.branch, self.along)
         row |= {dim: matched(self.centre, result, dim) for dim in self.lists}
@@ -118,6 +118,15 @@ class Gathered:
         if (share < 1).any():
             found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")
         return found
+
+
+def _at_same(centre: xr.DataArray, array: xr.DataArray) -> xr.DataArray:
+    """A variable of a draw at the instants, frequencies, ... of the result itself; NaN where the draw has none."""
+    for dim in array.dims:
+        if dim in centre.indexes and dim in array.indexes and array[dim].dtype.kind == "f":
+            if not array.indexes[dim].equals(centre.indexes[dim]):
+                array = array.drop_duplicates(dim, keep="last").reindex({dim: centre[dim].values})
+    return array
 
 
 def _along_sheets(centre: xr.Dataset, result: xr.Dataset, name: str, along: list[str]) -> dict[str, Any]:

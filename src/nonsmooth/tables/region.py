@@ -111,8 +111,8 @@ def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _En
         return (quantity(data, name, known),)  # which says what there is
     if len(stems) == 1 and stems[0] in known:
         return (known[stems[0]],)
-    upper = [known[f"{stem}_maximum"] if f"{stem}_maximum" in known else known[stem] for stem in stems]
-    lower = [
+    upper: list[Any] = [known[f"{stem}_maximum"] if f"{stem}_maximum" in known else known[stem] for stem in stems]
+    lower: list[Any] = [
         known[f"{stem}_minimum"] if f"{stem}_minimum" in known else one if stem in known else xr.full_like(one, -np.inf)
         for stem, one in zip(stems, upper, strict=True)
     ]
