@@ -122,10 +122,9 @@ class Gathered:
 
 def _at_same(centre: xr.DataArray, array: xr.DataArray) -> xr.DataArray:
     """A variable of a draw at the instants, frequencies, ... of the result itself; NaN where the draw has none."""
-    for dim in array.dims:
-        if dim in centre.indexes and dim in array.indexes and array[dim].dtype.kind == "f":
-            if not array.indexes[dim].equals(centre.indexes[dim]):
-                array = array.drop_duplicates(dim, keep="last").reindex({dim: centre[dim].values})
+    for dim, own in array.indexes.items():
+        if dim in centre.indexes and own.dtype.kind == "f" and not own.equals(centre.indexes[dim]):
+            array = array.drop_duplicates(dim, keep="last").reindex({dim: centre[dim].values})
     return array
 
 
