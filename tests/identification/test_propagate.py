@@ -234,6 +234,22 @@ def test_the_band_of_a_run_is_that_of_each_instant_whenever_the_draws_have_their
     assert np.allclose(band["u_share"].sel(state="x").values, np.where(sampled, 1.0, 0.0))  # its own impact is nobody's
 
 
+def test_the_share_of_an_attractor_is_its_own_where_another_becomes_the_larger() -> None:
+    """Attractors are numbered by their shares: period 3 and period 4 change places within the draws."""
+    support = ns.models.discontinuous_support(omega=11.15, rho=0.33, g=0.00145)
+    grid = {"x": np.linspace(-0.01, 0.01, 7), "v": np.linspace(-0.1, 0.1, 7)}
+    known = {"settings": {"g": (0.00145, 1.5e-5)}, "draws": 8, "progress": False}
+    band = ns.propagate({}, ns.basins, support, grid, **known)
+    drawn = [ns.basins(support.with_parameters(g=g), grid, progress=False) for g in band["drawn_g"].values]
+    firsts = {int(one["period_number"][0]) for one in drawn}
+    assert firsts == {3, 4}
+    for k, period in enumerate(band["period_number"].values):
+        own = [one["fraction"].values[one["period_number"].values == period] for one in drawn]
+        shares = np.concatenate(own)
+        expected = np.quantile(shares, [0.025, 0.5, 0.975])
+        assert np.allclose(band["fraction_quantiles"].values[:, k], expected)
+
+
 def test_draws_that_fail_are_counted() -> None:
     s = support()
 

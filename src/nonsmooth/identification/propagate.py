@@ -90,7 +90,8 @@ def propagate(
         give ``duration=`` and ``samples=``, so that every draw has them. For period numbers
         ``period_number_probability`` over ``period_value`` (0: none found), for ``stable`` ``stable_probability``. Of a
         branch, at each of its points the values of drawn branches at the same parameter, between the same folds (of a
-        diagram of several branches only the special points). Jumps and special points are matched by kind and nearness:
+        diagram of several branches only the special points). Attractors of a draw are those near which they lie (by the
+        extremes of their motions). Jumps and special points are matched by kind and nearness:
         ``jump_value_draws`` and ``special_value_draws`` over ``draw``, their ``_quantiles`` and ``_share``. With
         ``first_order``:
         ``special_slope`` over ``special`` and ``source`` (g), and ``special_first_order`` (the standard uncertainty).
