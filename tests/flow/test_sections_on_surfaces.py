@@ -137,3 +137,20 @@ def test_a_plastic_impact_passes_its_stop_both_ways_where_the_mass_is_drawn_off(
         known = run.crossing_time.values[np.isin(labels, met)]
         found = ns.poincare(mass, section=ns.Poincare("one_gap", rising=rising), n=len(known), method=method)
         np.testing.assert_allclose(found.time.values, known, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+@pytest.mark.parametrize("rising", [True, False, None])
+def test_a_mass_that_its_belt_carries_into_a_stop_meets_it_there(rising: bool | None, method: str) -> None:
+    """It rides at 1/5 for 3/10: what the stop and the belt then do is decided together."""
+    elements = {
+        "belt": E.Coulomb(at="q", belt=0.2, friction=0.3),
+        "stop": E.Stop(at="q", position=0.3, restitution=0.8),
+    }
+    mass = ns.mechanical(1.0, 0.0, 0.1, elements=elements, indicators={"own": lambda t, u, p: 3 * u.q - 0.1})
+    section, start = ns.Poincare("stop_gap", rising=rising), {"v_q": 0.2}
+    found = ns.poincare(mass, section=section, n=4, start=start, method=method)
+    run = ns.simulate(mass, duration=float(found.time[-1]) + 1e-9, start=start, method=method)
+    struck = run.crossing_time.values[run.stop_impact_speed.values > 0]
+    assert struck[0] == pytest.approx(1.5, abs=1e-12)
+    np.testing.assert_allclose(found.time.values, struck, rtol=1e-9)

@@ -289,8 +289,9 @@ def met(t, fired, form, net, section, tables, work):
         for k in range(net.row_start[t], net.row_start[t + 1]):
             if net.rows[k, 0] == fired:
                 sense = net.rows[k, 1]
-    elif vanishes(tables, source, f, work.before) and slope_of(tables, source, f, work.before) * work.found[SIDE] < 0.0:
-        sense = -work.found[SIDE]
+    if sense == 0 and vanishes(tables, source, f, work.before):
+        if slope_of(tables, source, f, work.before) * work.found[SIDE] < 0.0:
+            sense = -work.found[SIDE]
     if section.rising * sense < 0:
         back = work.zero[f] != 0 and sign_after(tables, work, work.tally[MODE], f) == section.rising
         sense = section.rising if back else 0
