@@ -28,7 +28,7 @@ def test_jumps_of_a_bistable_motion() -> None:
     by less than one percent; going down it is the mirror image. Half the range of x jumps there."""
     system = ns.System(
         states=["x"],
-        parameters={"a": 0.0, "w": 20.0},
+        parameters={"a": (0.0, "N"), "w": 20.0},
         modes={"only": lambda t, u, p: u.x - u.x**3 + p.a + 0.01 * np.cos(p.w * t)},
     )
     a = np.linspace(-0.6, 0.6, 61)
@@ -39,6 +39,7 @@ def test_jumps_of_a_bistable_motion() -> None:
     fold = 2 / (3 * np.sqrt(3))
     width = a[1] - a[0]
     assert np.allclose(response["jump_step"], width)
+    assert response["jump_step"].attrs["units"] == response["jump_value"].attrs["units"] == "N"
     assert abs(response["jump_value"].values[0] - fold) <= 0.5 * width + 0.01 * fold
     assert abs(response["jump_value"].values[1] + fold) <= 0.5 * width + 0.01 * fold
     assert (response["jump_before"].values > response["jump_after"].values).all()

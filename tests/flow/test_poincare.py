@@ -143,6 +143,25 @@ def test_one_start_of_several_may_fail() -> None:
         ns.poincare(system, n=3, start={"x": 5.0})
 
 
+def test_a_start_beyond_a_stop_that_moves_back_is_none_among_others_either() -> None:
+    mass = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 0.9},
+        forcing={"q": lambda t, p: 0.3 * np.cos(p.w * t)},
+        elements={
+            "stop": ns.elements.Stop(at="q", position=0.5, restitution=0.6),
+            "rub": ns.elements.Coulomb(at="q", friction=0.1),
+        },
+    )
+    points = ns.poincare(mass, n=3, start=[{"q": 1.0, "v_q": -0.1}, {"q": 0.0}])
+    meanings = points["status"].attrs["flag_meanings"].split()
+    assert [meanings[k] for k in points["status"].values] == ["no_convergence", "ok"]
+    assert np.isnan(points["section"].values[0]).all() and np.isnan(points["time"].values[0]).all()
+    assert np.isfinite(points["section"].values[1]).all()
+
+
 def test_maxima_of_the_relief_valve_repeat_the_published_cycle() -> None:
     """q = 8: the cycle spans 0.668282564 <= y1 <= 6.009885866 with period 2.392389442 (Hos & Champneys 2012)."""
     valve = ns.models.relief_valve(q=8.0)

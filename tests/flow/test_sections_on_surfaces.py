@@ -96,3 +96,61 @@ def test_an_impact_passes_its_stop_both_ways(method: str) -> None:
     ]
     np.testing.assert_allclose(times[1], times[0], rtol=1e-12)
     np.testing.assert_allclose(times[2], times[0], rtol=1e-12)
+
+
+E, load = ns.elements, {"q": lambda t, p: np.cos(p.w * t)}
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+@pytest.mark.parametrize(
+    ("element", "surface", "plane", "way"),
+    [
+        (E.Coulomb(at="q", friction=0.1), "one_speed", lambda t, u, p: 3 * u.v_q, 1),
+        (E.Coulomb(at="q", friction=0.4, belt=0.3), "one_speed", lambda t, u, p: u.v_q - 0.3, 1),
+        (E.ElasticStop(at="q", position=0.5, stiffness=9.0), "one_gap", lambda t, u, p: u.q - 0.5, -1),
+        (E.ElasticStop(at="q", position=0.5, stiffness=9.0, damping=0.4), "one_gap", lambda t, u, p: u.q - 0.5, -1),
+        (E.Stop(at="q", position=0.5, restitution=0.5), "one_gap", lambda t, u, p: u.q - 0.5, -1),
+        (E.Stop(at="q", position=0.5), "one_gap", lambda t, u, p: 2 * u.q - 1.0, -1),
+    ],
+)
+def test_a_plane_of_ones_own_where_an_element_has_its_surface(element, surface, plane, way: int, method: str) -> None:
+    """Both vanish together, so that both are passed at the same instants."""
+    mass = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"w": 0.6}, forcing=load, elements={"one": element}, indicators={"own": plane}
+    )
+    for rising in (True, False, None):
+        own, known = (
+            ns.poincare(mass, section=ns.Poincare(name, rising=up), n=12, method=method).time.values
+            for name, up in (("own", rising), (surface, rising if rising is None or way > 0 else not rising))
+        )
+        np.testing.assert_allclose(own, known, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+def test_a_plastic_impact_passes_its_stop_both_ways_where_the_mass_is_drawn_off(method: str) -> None:
+    mass = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"w": 0.6}, forcing=load, elements={"one": E.Stop(at="q", position=0.5)}
+    )
+    run = ns.simulate(mass, duration=60.0, method=method)
+    labels = np.array([mass.transitions[k].label for k in run.crossing_transition.values])
+    for rising, met in ((True, ("one_open -> one_open",)), (False, ("one_open -> one_open", "one_open -> one_rest"))):
+        known = run.crossing_time.values[np.isin(labels, met)]
+        found = ns.poincare(mass, section=ns.Poincare("one_gap", rising=rising), n=len(known), method=method)
+        np.testing.assert_allclose(found.time.values, known, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+@pytest.mark.parametrize("rising", [True, False, None])
+def test_a_mass_that_its_belt_carries_into_a_stop_meets_it_there(rising: bool | None, method: str) -> None:
+    """It rides at 1/5 for 3/10: what the stop and the belt then do is decided together."""
+    elements = {
+        "belt": E.Coulomb(at="q", belt=0.2, friction=0.3),
+        "stop": E.Stop(at="q", position=0.3, restitution=0.8),
+    }
+    mass = ns.mechanical(1.0, 0.0, 0.1, elements=elements, indicators={"own": lambda t, u, p: 3 * u.q - 0.1})
+    section, start = ns.Poincare("stop_gap", rising=rising), {"v_q": 0.2}
+    found = ns.poincare(mass, section=section, n=4, start=start, method=method)
+    run = ns.simulate(mass, duration=float(found.time[-1]) + 1e-9, start=start, method=method)
+    struck = run.crossing_time.values[run.stop_impact_speed.values > 0]
+    assert struck[0] == pytest.approx(1.5, abs=1e-12)
+    np.testing.assert_allclose(found.time.values, struck, rtol=1e-9)

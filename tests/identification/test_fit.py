@@ -451,6 +451,12 @@ def test_a_channel_in_another_unit_is_told_of_unless_its_gain_is_given(recwarn):
     mass = ns.mechanical(1.0, "c", "k", coordinates={"x": "m"}, parameters={"c": 0.15, "k": 4.2})
     with pytest.warns(UserWarning, match="channel 'disp' is in mm, the model in m"):
         problem_of(mass, x, ["c", "k"], {"measured": {"x": "disp"}})
+    metres = (x / 1e3).assign(disp=("time", x["disp"].values / 1e3, {"units": "m"}))
+    with pytest.warns(UserWarning, match="channel 'disp' is in mm, the model in m"):  # one of several recordings
+        problem_of(mass, [x, metres], ["c", "k"], {"measured": {"x": "disp"}})
+    slow = metres.assign_coords(time=("time", 1e3 * t, {"units": "ms"}))
+    with pytest.warns(UserWarning, match="channel 'time' is in ms, the model in s"):
+        problem_of(mass, slow, ["c", "k"], {"measured": {"x": "disp"}})
     recwarn.clear()
     found = ns.fit(mass, x, ["c", "k"], measured={"x": ns.Sensor("disp", gain=1e3)}, tries=1, progress=False)
     assert not [one for one in recwarn if "the model in" in str(one.message)]

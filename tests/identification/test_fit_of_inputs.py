@@ -102,3 +102,35 @@ def test_models_with_an_input_are_ranked_by_what_they_predict() -> None:
     record = {"x": (run["time"].values, run["u"].sel(state="x").values + noise), "f": (t, force)}
     models = {"damped": (free, ["k", "c"]), "free": (free.with_parameters(c=0.0), ["k"])}
     assert ns.select_model(models, record, measured=["x"], folds=2, progress=False).attrs["best"] == "damped"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 6])
+def test_two_records_of_a_driven_mass_with_a_stop_and_friction_whose_sensor_is_late(seed: int) -> None:
+    """Different rates, a gain between units, and a delay to be found: first guesses end windows before their time."""
+    rng, elements = np.random.default_rng(seed), ns.elements
+    rig = ns.mechanical(
+        1.0,
+        "c",
+        "k",
+        parameters={"k": 1.2, "c": 0.1, "mu": 0.05, "d": 0.25, "e": 0.6},
+        forcing={"q": lambda t, p: p.force},
+        inputs=["force"],
+        elements={
+            "stop": elements.Stop(at="q", position="d", restitution="e"),
+            "rub": elements.Coulomb(at="q", friction="mu"),
+        },
+    )
+    records, late = [], 0.03
+    for length, step in ((25.0, 0.05), (18.0, 0.11)):
+        at, t = np.arange(0, length + 1, 0.1), np.arange(late, length, step)
+        force = 0.8 * np.sin((0.5 + 0.03 * at) * at + rng.uniform(0, 6)) + 0.3 * np.sin(2.1 * at)
+        start = {"q": rng.uniform(-0.2, 0.1), "v_q": rng.uniform(-0.2, 0.2)}
+        run = ns.simulate(rig, duration=length, samples=t - late, start=start, inputs={"force": (at, force)})
+        q = run.drop_duplicates("time", keep="last").sel(time=t - late)["u"].sel(state="q").values
+        records.append({"q in mm": (t, 1e3 * q + rng.normal(0, 1, len(t))), "force": (at, force)})
+    first = rig.with_parameters({name: value * rng.uniform(0.93, 1.07) for name, value in rig.values.items()})
+    names, sensor = [*rig.values, "q.delay"], {"q": ns.Sensor("q in mm", gain=1e3)}
+    found = ns.fit(first, records, names, measured=sensor, progress=False)
+    for name, value in rig.values.items():
+        assert abs(found[name] - value) < 4 * found.uncertainty[name]
+    assert abs(found.extra["q.delay"].value - late) < 4 * found.extra["q.delay"].uncertainty

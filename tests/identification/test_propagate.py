@@ -215,6 +215,41 @@ def test_a_number_of_a_function_and_bounds() -> None:
     np.testing.assert_array_equal(array["value_quantiles"], band["value_quantiles"])
 
 
+def test_the_band_of_a_run_is_that_of_each_instant_whenever_the_draws_have_their_impacts() -> None:
+    """A ball that falls from 1/2 and rebounds at 1 / sqrt(g): x = 1/2 - g t^2 / 2 before, and after it with e = 1/2."""
+    ball = ns.System(
+        states=["x", "v"],
+        parameters={"g": 1.0},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        elements={"floor": ns.elements.Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}, restitution=0.5)},
+    )
+    options = {"duration": 1.7, "start": {"x": 0.5}, "samples": [0.0, 0.5, 0.99, 1.01, 1.5, 1.7]}
+    band = ns.propagate({}, ns.simulate, ball, settings={"g": (1.0, 0.05)}, draws=60, progress=False, **options)
+    g, t = band["drawn_g"].values, band["time"].values[:, None]
+    at = 1 / np.sqrt(g)
+    exact = np.where(t < at, 0.5 - g * t**2 / 2, 0.5 * (t - at) * g * at - g * (t - at) ** 2 / 2)
+    sampled = np.isin(t[:, 0], options["samples"])
+    expected = np.quantile(exact, [0.025, 0.5, 0.975], axis=1)[:, sampled]
+    assert np.abs(band["u_quantiles"].sel(state="x").values[:, sampled] - expected).max() < 1e-9
+    assert np.allclose(band["u_share"].sel(state="x").values, np.where(sampled, 1.0, 0.0))  # its own impact is nobody's
+
+
+def test_the_share_of_an_attractor_is_its_own_where_another_becomes_the_larger() -> None:
+    """Attractors are numbered by their shares: period 3 and period 4 change places within the draws."""
+    support = ns.models.discontinuous_support(omega=11.15, rho=0.33, g=0.00145)
+    grid = {"x": np.linspace(-0.01, 0.01, 7), "v": np.linspace(-0.1, 0.1, 7)}
+    known = {"settings": {"g": (0.00145, 1.5e-5)}, "draws": 8, "progress": False}
+    band = ns.propagate({}, ns.basins, support, grid, **known)
+    drawn = [ns.basins(support.with_parameters(g=g), grid, progress=False) for g in band["drawn_g"].values]
+    firsts = {int(one["period_number"][0]) for one in drawn}
+    assert firsts == {3, 4}
+    for k, period in enumerate(band["period_number"].values):
+        own = [one["fraction"].values[one["period_number"].values == period] for one in drawn]
+        shares = np.concatenate(own)
+        expected = np.quantile(shares, [0.025, 0.5, 0.975])
+        assert np.allclose(band["fraction_quantiles"].values[:, k], expected)
+
+
 def test_draws_that_fail_are_counted() -> None:
     s = support()
 

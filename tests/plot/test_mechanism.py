@@ -102,6 +102,18 @@ def test_masses_of_numbers_and_springs_beyond_the_next_mass() -> None:
     assert len(Sketch(scheme).above) == 1  # the spring from the first to the last
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_what_rounding_leaves_of_a_free_chain_is_no_spring_and_no_mass_beside_the_diagonal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    m, k, c = rng.uniform(0.3, 2, 3).round(2), rng.uniform(0.3, 2, 3).round(2), rng.choice([0.05, 0.07, 0.013])
+    K = np.diag(k) + np.diag([*k[1:], 0.0]) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
+    scheme = scheme_of(ns.mechanical(np.diag(m), c * K, K, parameters={}))
+    assert scheme.masses == [f"{one:.4g}" for one in m]
+    for kind, values in (("spring", k), ("damper", c * k)):
+        found = {(one.left, one.right): one.label for one in scheme.links if one.kind == kind}
+        assert found == {place: f"{one:.4g}" for place, one in zip([(GROUND, 0), (0, 1), (1, 2)], values, strict=True)}
+
+
 @pytest.mark.parametrize(
     ("name", "mass", "contacts"),
     [

@@ -45,6 +45,8 @@ def test_a_run_at_even_instants_is_computed_not_interpolated(swinging) -> None:
     assert np.allclose(t, 0.1 * np.arange(31), rtol=0, atol=1e-15)
     assert np.abs(found["q (m)"] - np.cos(2 * t)).max() < 1e-12
     assert np.abs(found["v_q (m/s)"] + 2 * np.sin(2 * t)).max() < 1e-12
+    part = ns.table(run.sel(time=slice(0.5, 2.5)), step=0.25)  # a window of the run is computed anew too
+    assert np.abs(part["q (m)"] - np.cos(2 * part["time (s)"])).max() < 1e-12
     at = [0.3, 1.7]
     assert np.allclose(ns.table(run, ["q"], samples=at)["q (m)"], np.cos(2 * np.array(at)), rtol=0, atol=1e-12)
     assert len(ns.table(run, samples=7)) == 7

@@ -9,7 +9,7 @@ import numpy as np
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
-from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, warn_if_slow
+from nonsmooth.flow.failure import beyond_stops, refuse_beyond_stops, solve_error, warn_if_slow
 from nonsmooth.flow.options import Solver, as_called, solver_of
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, start_states
@@ -74,9 +74,11 @@ def poincare(
         refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
     engine = engine_for(system, **solver_of(options))
     out = engine.kept(len(starts), n)
-    tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))
+    points = np.tile(system.parameter_vector(), (len(starts), 1))
     state = State(starts[0].copy(), system.memory_vector())
-    engine.chain(tables, 0, len(starts), state, starts, plan, transient, n, out)
+    engine.chain(engine.prepare(points), 0, len(starts), state, starts, plan, transient, n, out)
+    beyond = beyond_stops(system, points, starts)
+    out.status[beyond], out.section[beyond], out.section_time[beyond] = codes.BEYOND_STOP, np.nan, np.nan
     if is_one_start(start) and out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
         raise solve_error(int(out.status[0]), begun=(system, starts[0]))
     warn_if_slow(system, starts, out.section)

@@ -51,7 +51,8 @@ class Poincare:
         Name of the indicator.
     rising : bool or None
         Through zero upwards, downwards, or (None) both. A motion that comes to the surface and slides or rests on it
-        has passed it when it arrives, not when it leaves; an impact passes it both upwards and downwards.
+        has passed it when it arrives, not when it leaves; an impact passes it both upwards and downwards. A jump from
+        one side to the other is no pass: the motion is nowhere on the surface.
     mode : str, optional
         Count it in this mode only.
     side : str

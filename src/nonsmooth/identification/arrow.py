@@ -78,6 +78,7 @@ def reduced(
     for i, piece in enumerate(problem.pieces):
         w = weights[i]
         g, s, r = state.in_parameters[i] * w[:, None], state.in_start[i] * w[:, None], state.residuals[i] * w
+        r = np.where(np.isfinite(r), r, 0.0)  # a motion that does not come to its end pulls nowhere
         n, m = s.shape[1], len(piece.which)
         size = np.linalg.norm(s, axis=0)
         size[size == 0.0] = 1.0  # a number of the start that is known

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.attractors.basins_matching import CLOSE
 from nonsmooth.identification.compare.draws import drawn_variables
 from nonsmooth.identification.compare.response import nearest_alike
 from nonsmooth.results.labels import labelled
@@ -45,8 +46,9 @@ class Gathered:
 
     def add(self, result: xr.Dataset) -> None:
         """Keep what a draw gave."""
-        same = [name for name in self.plain if name in result and result[name].shape == self.centre[name].shape]
-        row = {name: result[name].values for name in same}
+        result = _same_attractors(self.centre, result, self.plain)
+        there = {name: _at_same(self.centre[name], result[name]) for name in self.plain if name in result}
+        row = {name: array.values for name, array in there.items() if array.shape == self.centre[name].shape}
         if self.along:
             row |= _along_sheets(self.centre, result, self.branch, self.along)
         row |= {dim: matched(self.centre, result, dim) for dim in self.lists}
@@ -95,7 +97,8 @@ class Gathered:
                 mean = np.nanmean(np.asarray(stack, float), axis=0)
             return {f"{name}_probability": labelled(array.dims, mean, f"share of draws: {name}")}
         if name == "period_number":
-            numbers = np.unique(np.append(stack, array.values))
+            every = np.append(stack, array.values)
+            numbers = np.unique(every[np.isfinite(every)]).astype(array.dtype)
             shares = np.stack([np.mean(stack == number, axis=0) for number in numbers])
             return {
                 "period_number_probability": labelled(
@@ -118,6 +121,34 @@ class Gathered:
         if (share < 1).any():
             found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")
         return found
+
+
+def _same_attractors(centre: xr.Dataset, result: xr.Dataset, names: list[str]) -> xr.Dataset:
+    """A draw with its attractors, whose numbers are its own, in the places of those near which they lie; NaN where the
+    draw has none."""
+    from scipy.optimize import linear_sum_assignment
+
+    if "attractor" not in centre.dims or not result.sizes.get("attractor") or "maximum" not in centre:
+        return result
+    own = centre[["maximum", "minimum"]].rename(attractor="own")
+    others = set(own["maximum"].dims) - {"state"}
+    size = own["maximum"].max(others) - own["minimum"].min(others)
+    away = (abs(own["maximum"] - result["maximum"]) + abs(own["minimum"] - result["minimum"])) / size
+    away = away.mean(set(away.dims) - {"own", "attractor"}).transpose("own", "attractor").fillna(np.inf)
+    places, pairs = np.full(len(away), -1), linear_sum_assignment(np.minimum(away, 1e9))
+    for k, j in zip(*pairs, strict=True):
+        places[k] = j if away[k, j] < CLOSE else -1
+    taken, there = result.isel(attractor=places), xr.DataArray(places >= 0, dims="attractor")
+    of_them = [name for name in names if name in taken and "attractor" in taken[name].dims]
+    return taken.assign({name: taken[name].where(there) for name in of_them})
+
+
+def _at_same(centre: xr.DataArray, array: xr.DataArray) -> xr.DataArray:
+    """A variable of a draw at the instants, frequencies, ... of the result itself; NaN where the draw has none."""
+    for dim, own in array.indexes.items():
+        if dim in centre.indexes and own.dtype.kind == "f" and not own.equals(centre.indexes[dim]):
+            array = array.drop_duplicates(dim, keep="last").reindex({dim: centre[dim].values})
+    return array
 
 
 def _along_sheets(centre: xr.Dataset, result: xr.Dataset, name: str, along: list[str]) -> dict[str, Any]:

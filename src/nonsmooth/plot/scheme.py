@@ -76,8 +76,8 @@ class _SchemeReader:
             for i in range(size):
                 of = masses[i] if masses[i] is not None else sp.Integer(1)
                 row = [sp.expand(of * entry) for entry in table[i]]
-                if not self.is_zero(own := sp.expand(sp.Add(*row))):
-                    scheme.links.append(Link(kind, GROUND, i, self.text(own)))
+                if not self.is_zero(*row):
+                    scheme.links.append(Link(kind, GROUND, i, self.text(sp.expand(sp.Add(*row)))))
                 for j in range(i):
                     if not self.is_zero(row[j]):
                         scheme.links.append(Link(kind, j, i, self.text(-row[j])))
@@ -104,8 +104,11 @@ class _SchemeReader:
         seen = re.sub(r"\\[a-zA-Z]+", "x", re.sub(r"\\(left|right|mathrm|cos|sin|frac)", "", found))
         return found if len(re.sub(r"[{}_^ ]", "", seen)) <= _LONGEST else ""
 
-    def is_zero(self, e: Any) -> bool:
-        return bool(e == 0 or sp.simplify(e) == 0)
+    def is_zero(self, *terms: Any) -> bool:
+        """Return whether a sum of terms is zero within rounding."""
+        parts = [sp.expand(e).as_coefficients_dict() for e in map(sp.sympify, terms)]
+        sums = [[part[one] for part in parts] for one in {one for part in parts for one in part}]
+        return bool(all(abs(sum(each)) <= 1e-12 * max(map(abs, each)) for each in sums)) or sp.simplify(sum(terms)) == 0
 
     def number(self, e: Any) -> float:
         """The value at the present parameters and t = 0; NaN where it has none."""
@@ -131,7 +134,7 @@ class _SchemeReader:
                 elif loaded != 0 and "base" not in powers:
                     found[i] = sp.simplify(sp.diff(push, v) / loaded)
             pairs = [(i, j) for i in range(size) for j in range(size) if found[i] is not None]
-            if 0 in found or not all(self.is_zero(table[i][j] - found[i] * damping[i][j]) for i, j in pairs):
+            if 0 in found or not all(self.is_zero(table[i][j], -found[i] * damping[i][j]) for i, j in pairs):
                 raise self._off("its mass matrix is not diagonal")
         for load in self.loads.elements if self.loads is not None else ():
             if load.kind == "Rubbing":

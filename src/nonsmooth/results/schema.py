@@ -280,9 +280,9 @@ def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, Arr
         "amplitude": heights.transpose(*maximum.dims).assign_attrs(long_name="half the peak-to-peak value")
     }
     for name, values in jumps.items():
-        told = {"long_name": _JUMPS[name]} if name in _JUMPS else {}
-        if name == "value":
-            told = {"long_name": f"{parameter} at the jump", "units": swept[parameter].attrs.get("units", "1")}
+        told = {"long_name": _JUMPS.get(name, f"{name} of the jump")}
+        if name in ("value", "step"):
+            told = {"long_name": f"{parameter}, {name} at the jump", "units": swept[parameter].attrs.get("units", "1")}
         variables[f"jump_{name}"] = ("jump", np.array(values, dtype=str if name in _JUMPS else None), told)
     return swept.assign(variables)
 

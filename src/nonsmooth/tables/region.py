@@ -95,7 +95,7 @@ def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
     return inside.rename("region")
 
 
-#: A quantity by the values that it takes: its one value, or the least and the largest.
+#: A quantity by the values that it takes: its one value, or the least (-inf: not known) and the largest.
 _Ends = tuple[Any, ...]
 
 
@@ -107,12 +107,16 @@ def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _En
         found = (re.fullmatch(rf"(.+_{name})(?:_maximum)?", key) for key in known)
         stems = [one[1] for one in found if one is not None and not one[1].endswith(("_minimum", "_amplitude"))]
         stems = [stem for stem in dict.fromkeys(stems) if name != "force" or not stem.endswith("friction_force")]
-    lower = [known[f"{stem}_minimum"] for stem in stems if f"{stem}_minimum" in known]
-    upper = [known.get(f"{stem}_maximum", known.get(stem)) for stem in stems]
-    every: list[Any] = [one for one in [*lower, *upper] if one is not None]
-    if not every:
+    if not stems:
         return (quantity(data, name, known),)  # which says what there is
-    return (every[0],) if len(every) == 1 else (reduce(np.minimum, every), reduce(np.maximum, every))
+    if len(stems) == 1 and stems[0] in known:
+        return (known[stems[0]],)
+    upper: list[Any] = [known[f"{stem}_maximum"] if f"{stem}_maximum" in known else known[stem] for stem in stems]
+    lower: list[Any] = [
+        known[f"{stem}_minimum"] if f"{stem}_minimum" in known else one if stem in known else xr.full_like(one, -np.inf)
+        for stem, one in zip(stems, upper, strict=True)
+    ]
+    return reduce(np.minimum, lower), reduce(np.maximum, upper)
 
 
 def _parsed(condition: str) -> ast.expr:
@@ -162,7 +166,16 @@ def _holds(read: Any, held: Mapping[sp.Symbol, _Ends], condition: str) -> Any:
         raise ValueError(f"{shortened(condition)} is no condition: write {_FORM}")
     left, right = read.args
     cases = _cases(left - right, held, condition)
-    return reduce(operator.and_, (_COMPARE[type(read)](_value(left, one), _value(right, one)) for one in cases))
+    parts = [_COMPARE[type(read)](_value(left, one), _value(right, one)) for one in cases]
+    for one, part in zip(cases, parts, strict=True):
+        unknown = [str(symbol) for symbol, value in one.items() if len(held[symbol]) > 1 and np.isinf(value).all()]
+        if unknown and (np.isinf(_value(left - right, one)) & ~part).any():
+            name = unknown[0]
+            raise ValueError(
+                f"{shortened(condition)}: of {name} this result holds the largest value alone, which says nothing of "
+                f"the smaller ones: compare it from below ({name} < ...), or take the quantity that ends in _maximum"
+            )
+    return reduce(operator.and_, parts)
 
 
 def _cases(difference: sp.Expr, held: Mapping[sp.Symbol, _Ends], condition: str) -> list[dict[sp.Symbol, Any]]:

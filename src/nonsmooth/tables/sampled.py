@@ -74,10 +74,11 @@ def _anew(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset | None:
         warnings.simplefilter("ignore")  # the run has said it
         again = simulate(recorded_system(record), **known)
     size = np.nanmax(np.abs(run["u"].values), axis=0)
-    same = np.abs(again["u"].values[-1] - run["u"].values[-1]) <= _SAME * size
+    end, *rows = np.searchsorted(again["time"].values, [last[0], *instants], side="right") - 1
+    same = np.abs(again["u"].values[end] - run["u"].values[-1]) <= _SAME * size
     if again.sizes["crossing"] != run.sizes["crossing"] or not (same | np.isnan(run["u"].values[-1])).all():
         return None  # memory or a start that the record does not hold
-    return again.isel(time=np.searchsorted(again["time"].values, instants, side="right") - 1)
+    return again.isel(time=rows)
 
 
 def _interpolated(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset:

@@ -126,7 +126,7 @@ def compare(
     Distances of clouds are in units of the spread of the measured points in each state, or of its noise where that is
     larger. The predicted points are given the measured noise (seeded), so that a motion that is predicted exactly is
     at the distance of the measured cloud's own halves. The energy distance is the root,
-    :math:`\sqrt{2 E|X-Y| - E|X-X'| - E|Y-Y'|}`, as SciPy defines it.
+    :math:`\sqrt{2 E|X-Y| - E|X-X'| - E|Y-Y'|}`, as SciPy defines it; NaN with fewer than 40 points in a cloud.
     """
     set_ = _settings(theory, parameters, settings)
     options["draws"] = _draws(options["draws"], theory, parameters, set_)

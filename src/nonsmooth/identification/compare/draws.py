@@ -150,8 +150,9 @@ def draw_systems(
             kept.append(row)
         if refused > MOST_REFUSED * draws:
             raise ValueError(
-                f"of {refused + len(systems)} draws only {len(systems)} are allowed by {system.name!r}: a parameter's "
-                "uncertainty is many times its value; identify it better, or leave it out of the covariance"
+                f"of {refused + len(systems)} draws only {len(systems)} are allowed by {system.name!r} and bounds=: a "
+                "parameter's uncertainty is many times its value (identify it better, or leave it out of the "
+                "covariance), or its value lies outside the bounds"
             )
     return systems, {name: np.array([row[name] for row in kept]) for name in (kept[0] if kept else ())}
 

@@ -89,8 +89,9 @@ def read_records(
     channels = list(dict.fromkeys(name for table in tables.values() for name in table))
     quantities = [] if tables else [q for one in steady for q in one.quantities]
     sensors = read_sensors(system, measured, channels or quantities)
-    units = {name: unit for one in given for name, unit in _units(one).items()}
+    units, clock = [_units(one) for one in given], options.get("time", "time")
     ours = {**system.states, **system.outputs}
+    _compare_units("recording", clock, units, "s" if any(system.states.values()) else "", "times in that unit")
     for quantity, sensor in sensors.items():
         if sensor.gain == 1.0:
             _compare_units(f"measured[{quantity!r}]", sensor.channel, units, ours[quantity], "Sensor(gain=...)")
@@ -116,22 +117,22 @@ def read_records(
 
 
 def _units(recording: Any) -> dict[str, str]:
-    """Units of the channels, as far as a recording says them."""
+    """Units of the channels and of the time, as far as a recording says them."""
     if isinstance(recording, Recording):
         return recording.units
-    return {str(name): str(one.attrs.get("units", "")) for name, one in getattr(recording, "data_vars", {}).items()}
+    return {str(name): str(one.attrs.get("units", "")) for name, one in getattr(recording, "variables", {}).items()}
 
 
-def _compare_units(what: str, channel: str, units: Mapping[str, str], ours: str, remedy: str) -> None:
-    """Warn where channel and model are in units that are known and differ."""
-    theirs = units.get(channel, "")
-    one, other = read_unit(theirs), read_unit(ours)
-    if one is not None and other is not None and one != other:
-        warnings.warn(
-            f"{what}: channel {channel!r} is in {theirs}, the model in {ours}, and numbers are compared as they are; "
-            f"give {remedy}",
-            stacklevel=4,
-        )
+def _compare_units(what: str, channel: str, units: Sequence[Mapping[str, str]], ours: str, remedy: str) -> None:
+    """Warn where model and channel, in any of the recordings, are in units that are known and differ."""
+    for theirs in dict.fromkeys(one.get(channel, "") for one in units):
+        one, other = read_unit(theirs), read_unit(ours)
+        if one is not None and other is not None and one != other:
+            warnings.warn(
+                f"{what}: channel {channel!r} is in {theirs}, the model in {ours}, and numbers are compared as they "
+                f"are; give {remedy}",
+                stacklevel=4,
+            )
 
 
 def _driven(

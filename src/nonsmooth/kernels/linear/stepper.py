@@ -7,14 +7,14 @@ A segment is one step of the mode, or its part up to the first crossing, section
 from math import cos, fabs, sin
 
 from nonsmooth.kernels.compile.cache import inline, once
-from nonsmooth.kernels.hybrid.codes import FIRED, MODE, NO_END, TIME, TRIES
+from nonsmooth.kernels.hybrid.codes import FIRED, MODE, NO_END, SOURCE, TIME, TRIES
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.build import build
 from nonsmooth.kernels.linear.limits import flat, sign_after
 from nonsmooth.kernels.linear.polynomial import NEVER, classify
 from nonsmooth.kernels.linear.search import FUNCTIONAL, SIDE, search
 from nonsmooth.kernels.linear.tables import NODES, STATES, states_of, width_of
-from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, slope_of, turn, value_of, whole_step
+from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, noise, slope_of, turn, value_of, whole_step
 
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
@@ -181,6 +181,12 @@ def steps_at_a_stride(i, form, net, section):
     return strides
 
 
+@inline
+def vanishes(tables, mode, f, w):
+    """Return whether functional f is zero at w within rounding."""
+    return fabs(value_of(tables, mode, f, w)) <= noise(tables, mode, f, tables.info[mode, 0], w)
+
+
 @once
 def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
@@ -230,8 +236,10 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
             if low >= 0:
                 continue
         tau = search(tables, work, mode, rows, lo, hi, sense * found[SIDE] > 0, best)
-        if sense != 0 and fired >= 0 and functional == section.indicator and best - tau < SAME * tables.info[mode, 1]:
-            continue  # the transition there passes the section
+        if sense != 0 and tau >= 0.0 and fired >= 0 and best - tau < SAME * tables.info[mode, 1]:
+            if functional == section.indicator or vanishes(tables, mode, section.indicator, end):
+                found[SIDE] = -sense
+                continue  # the transition there passes the section
         if fired >= 0 and sense == 0 and begins_with(rows, lo, hi, net.row_start[fired]):
             near = ROOT if functional == rows[lo, 0] else AT_ONCE
             if tau >= best - near * tables.info[mode, 1]:  # the same root: what was declared first comes first
@@ -274,15 +282,19 @@ def arrive_at(t, since, full, wrapped, form, net, tables, work):
 def met(t, fired, form, net, section, tables, work):
     """Direction in which transition t, whose functional ``fired`` has crossed, meets the section; 0: it does not.
 
-    The direction is that of the arrival or, where the functional stays zero, of the departure: an impact does both."""
-    sense = 0
-    if fired == section.indicator:
+    It does where the section's functional comes to zero with it. The direction is that of the arrival or, where the
+    functional stays zero, of the departure: an impact does both."""
+    sense, f, source = 0, section.indicator, work.tally[SOURCE]
+    if fired == f:
         for k in range(net.row_start[t], net.row_start[t + 1]):
             if net.rows[k, 0] == fired:
                 sense = net.rows[k, 1]
-        if section.rising * sense < 0:
-            back = work.zero[fired] != 0 and sign_after(tables, work, work.tally[MODE], fired) == section.rising
-            sense = section.rising if back else 0
+    if sense == 0 and vanishes(tables, source, f, work.before):
+        if slope_of(tables, source, f, work.before) * work.found[SIDE] < 0.0:
+            sense = -work.found[SIDE]
+    if section.rising * sense < 0:
+        back = work.zero[f] != 0 and sign_after(tables, work, work.tally[MODE], f) == section.rising
+        sense = section.rising if back else 0
     return sense
 
 

@@ -150,4 +150,4 @@ def met(t, fired, form, net, section, tables, work):
         return 0
     if way == 0 or slope * way > 0.0:
         return 1
-    return 1 if fabs(J[row, 0]) <= noise and J[row, 1] * way > 0.0 else 0
+    return 1 if fabs(J[row, 0]) <= noise and work.side[section.indicator] * way > 0 else 0
