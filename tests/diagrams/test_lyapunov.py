@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.diagrams.spectrum import kaplan_yorke
+from nonsmooth.diagrams.spectrum import evaluated, kaplan_yorke
 from nonsmooth.elements import Coulomb, Stop
 
 DEFECT = 1e-10
@@ -332,7 +332,7 @@ def test_the_smoothed_switch_has_three_exponents() -> None:
     assert errors[0] < 2e-2 and errors[1] < 0.5 * errors[0] and errors[2] < 0.5 * errors[1]
     # Below the gap the memory is never written: it is no state then.
     quiet = spectrum(system.with_parameters(g=0.2).smoothed(1e-4), periods=64, transient=64)
-    assert np.isnan(quiet.exponents.values[2])
+    assert np.isnan(quiet.exponents.values[2]) and np.isnan(quiet.standard_error.values[2])
     assert abs(float(quiet.exponents[:2].sum()) + system.values["c"] / system.values["m"]) < 1e-10
 
 
@@ -394,6 +394,13 @@ def test_kaplan_yorke_dimension() -> None:
     assert kaplan_yorke(np.array([0.9056, 1e-4, -14.5723]), zero=1e-3) == 2 + 0.9056 / 14.5723
     assert kaplan_yorke(np.array([0.3, 0.1, -np.inf])) == 2.0
     assert kaplan_yorke(np.array([-1e-5, -0.3]), zero=1e-4) == 1.0
+
+
+def test_what_is_lost_has_no_error_and_what_is_not_known_has_none_either() -> None:
+    sums = np.tile([-np.inf, np.nan, -1.0], (32, 1))
+    found = evaluated(3, sums.mean(axis=0), sums, 32, 1.0, 0.0, 1.0, 0, forced=True)
+    assert found.exponents.tolist()[:2] == [-1.0, -np.inf] and found.error.tolist()[:2] == [0.0, 0.0]
+    assert np.isnan(found.exponents[2]) and np.isnan(found.error[2])
 
 
 def test_errors_at_the_door() -> None:

@@ -477,6 +477,14 @@ def test_a_trial_that_begins_with_an_impact_has_no_derivatives_and_ends_no_fit()
     assert marcher.run(mass.parameter_vector(), 0.0, times, start, mode, derivatives=True) is None
 
 
+def test_a_trial_far_faster_than_its_readings_is_given_up():
+    """x = cos(sqrt(k) t): three swings between two readings are followed, 16 000 are not."""
+    mass = ns.mechanical(1.0, 0.0, "k", coordinates=["x"], parameters={"k": 1.0})
+    marcher, times, start = Marcher(mass, ("k",)), np.arange(1.0, 101.0), np.array([1.0, 0.0])
+    assert marcher.run(np.array([400.0]), 0.0, times, start, 0).z[:, 0] == pytest.approx(np.cos(20 * times), abs=1e-10)
+    assert marcher.run(np.array([1e10]), 0.0, times, start, 0) is None
+
+
 def test_a_sample_where_an_input_changes_is_the_limit_behind_it():
     """A cart under a step at t = 1: v is -late per second of the delay behind it, also where the sample lies on it."""
     cart = ns.mechanical(

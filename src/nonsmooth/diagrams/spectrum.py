@@ -323,7 +323,7 @@ def evaluated(
             means = sums / (np.diff(edges)[:, None] * unit)
             error[:used] = means.std(axis=0, ddof=1) / np.sqrt(BATCHES)
             running[:, :used] = np.cumsum(sums, axis=0) / (edges[1:, None] * unit)
-        error[:used][~np.isfinite(exponents[:used])] = 0.0
+        error[:used][np.isinf(exponents[:used])] = 0.0
     # In an autonomous system one exponent is zero, and its estimate of the order of 1/t.
     zero = 0.0 if forced else float(np.nanmax([0.0, *(3 * error[:used])]) + 3.0 / (count * unit))
     return Spectrum(

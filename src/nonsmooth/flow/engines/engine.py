@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.kernels.hybrid.codes import GROW, LOGGED, RETURNS_OF_SECTION
+from nonsmooth.kernels.hybrid.codes import GROW, LOGGED, NO_CONVERGENCE, PAUSED, RETURNS_OF_SECTION, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 
 IntArray = NDArray[np.int64]
@@ -110,6 +110,7 @@ class KernelMarch:
         self.log, self.growth = Block(records.LOG, records.put_log), Block(records.GROWTH, records.put_growth)
         self.kept.put(Kept.room(1, 0, 0, 0))  # a run that keeps nothing looks at its row as well
         self.orders, self.reals = np.zeros(records.N_ORDERS, dtype=np.int64), np.zeros(records.N_REALS)
+        self.left = np.inf  # steps after which a run is given up
 
     def returns(
         self,
@@ -144,11 +145,11 @@ class KernelMarch:
         self.kept.put(out)
         self._ask(state, _NO_STARTS if starts is None else starts)
 
-    def logged(self, state: State, until: float) -> None:
-        """Ask for the log of point 0 to a time."""
+    def logged(self, state: State, until: float, most: float = np.inf) -> None:
+        """Ask for the log of point 0 to a time, in so many steps (in whole ``PATIENCE``)."""
         self._anywhere(0, LOGGED, 0)
         self.reals[:] = until, 0.0, -1.0, 0.0
-        self._ask(state, _NO_STARTS)
+        self._ask(state, _NO_STARTS, most)
 
     def grown(self, i: int, state: State, count: int, unit: float, growth: Any) -> None:
         """Ask for ``count`` units of time of point i with its frame (``records.Growth``)."""
@@ -160,15 +161,19 @@ class KernelMarch:
     def run(self, system: tuple[Any, Any, Any, Any]) -> int:
         """March what is asked for (model, transition table, tables, work). Returns a code of ``kernels.hybrid``."""
         blocks = self.call, self.kept, self.log, self.growth
-        return int(self.module.run(self.system.put(system), *(block.address for block in blocks)))
+        code = int(self.module.run(self.system.put(system), *(block.address for block in blocks)))
+        if code == PAUSED and system[3].tally[WAITS] == 0:  # for no answer
+            self.left -= PATIENCE
+        return code if self.left >= 0 else NO_CONVERGENCE
 
     def _anywhere(self, i: int, kind: int, keep: int) -> None:
         """A run that knows no section."""
         self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0, 0, -1
 
-    def _ask(self, state: State, starts: FloatArray) -> None:
+    def _ask(self, state: State, starts: FloatArray, most: float = np.inf) -> None:
         from nonsmooth.kernels.hybrid.records import Call
 
+        self.left = most
         self.call.put(Call(self.orders, self.reals, self.limit, starts, state.motion()))
 
 

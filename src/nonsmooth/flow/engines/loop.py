@@ -254,11 +254,13 @@ class Engine(ABC):
         samples: FloatArray,
         room: Any = None,
         changes: Changes | None = None,
+        most: float = np.inf,
     ) -> TrajectoryLog:
         """Point 0: march ``state`` to the time ``until``, with dense samples at the increasing absolute times
         ``samples`` (a sample exactly at a crossing is the limit after it). A state that a mode lacks is NaN.
 
-        States that stand for inputs are given new values at the times of ``changes``."""
+        States that stand for inputs are given new values at the times of ``changes``. A run of more than ``most`` steps
+        is given up (``codes.NO_CONVERGENCE``)."""
         from nonsmooth.kernels.hybrid import records
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
@@ -267,7 +269,7 @@ class Engine(ABC):
         spare, march = self.touches_of_a_leg(), self.march()
         given = NO_CHANGES if changes is None else changes
         state.counters[1] = int(state.settled)
-        march.logged(state, float(until))
+        march.logged(state, float(until), most)
         march.log.put(records.Log(*(*sampled, *crossings, *touches, spare, *given)))
         code, system = self._run(march, tables)
         while code == codes.LOG_FULL:

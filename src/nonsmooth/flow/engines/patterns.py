@@ -125,9 +125,10 @@ class PatternEngine(Engine):
         samples: FloatArray,
         room: Any = None,
         changes: Changes | None = None,
+        most: float = np.inf,
     ) -> TrajectoryLog:
         here, _ = self.enter(tables, 0, state)
-        log = super().record(here, state, until, samples, changes=changes)
+        log = super().record(here, state, until, samples, changes=changes, most=most)
         here.leave(state)
         numbers = np.array(here.numbers, dtype=np.int64)
         log.sample_mode = np.where(log.sample_mode < 0, -1, numbers[log.sample_mode])

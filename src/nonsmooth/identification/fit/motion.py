@@ -17,6 +17,7 @@ from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.system import System
 
+STEPS = 1000  # between two readings: a motion that takes more is none that they tell of
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
 
 
@@ -90,7 +91,8 @@ class Marcher:
             state.u[course.first :] = course.at(begin)
             z, changes = np.concatenate([state.u, state.memory]), course.changes(begin, times[-1])
             instants = np.union1d(times, changes.times)
-        log = self.engine.record(self._tables[1], state, times[-1], np.append(begin, instants), changes=changes)
+        samples, most = np.append(begin, instants), STEPS * len(instants)
+        log = self.engine.record(self._tables[1], state, times[-1], samples, changes=changes, most=most)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             return None
         u = np.hstack([np.nan_to_num(log.sample_u), log.sample_memory])
