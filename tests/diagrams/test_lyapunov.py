@@ -396,6 +396,27 @@ def test_kaplan_yorke_dimension() -> None:
     assert kaplan_yorke(np.array([-1e-5, -0.3]), zero=1e-4) == 1.0
 
 
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_a_chatter_beside_a_mass_that_sticks_leaves_its_place_alone(method: str) -> None:
+    """One mass bounces to rest in each period, its neighbour sticks by two frictions: its place is all that is left."""
+    elements = {
+        "floor": Stop(at="q1", side=-1, position=0.0, restitution=0.6),
+        "one": Coulomb(at="q2", friction=0.8),
+        "other": Coulomb(at="q2", friction=0.9),
+    }
+    for k in (0.3, 0.6, 0.9):
+        pair = ns.mechanical(
+            np.diag([1.3, 0.8]),
+            0.1 * np.eye(2),
+            [[k, -0.4], [-0.4, 1.0]],
+            parameters={"w": 0.9},
+            elements=elements,
+            forcing={"q1": lambda t, p: 2.0 * np.cos(p.w * t) - 1.5},
+        )
+        found = ns.lyapunov(pair, periods=40, transient=20, start={"q2": 0.1}, method=method)
+        assert found.exponents.values == pytest.approx([0.0, -np.inf, -np.inf, -np.inf], abs=1e-12)
+
+
 def test_what_is_lost_has_no_error_and_what_is_not_known_has_none_either() -> None:
     sums = np.tile([-np.inf, np.nan, -1.0], (32, 1))
     found = evaluated(3, sums.mean(axis=0), sums, 32, 1.0, 0.0, 1.0, 0, forced=True)

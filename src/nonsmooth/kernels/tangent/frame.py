@@ -9,7 +9,7 @@ from math import fabs, inf, log, sqrt
 from nonsmooth.kernels.compile.cache import inline
 
 ENOUGH = 0.25  # of the square of a length: where as much is left no part along others is
-NEAR = 1e-13  # of an indicator's size: it is zero
+NEAR = 1e-13  # of the size of an indicator, or of the terms of a change: it is zero
 ON_SURFACE = 1e-9  # of an indicator's size: nearer to a surface than this is on it
 SINGULAR = 1e-13  # a row smaller than this, or a pivot below this part of its row's size: a matrix without full rank
 LOST = 1e-11  # behind it a column shorter than this part of what it was has vanished
@@ -158,11 +158,12 @@ def saltation(R, R_t, f_minus, f_plus, t_z, n, S, A):
 
     S begins as the identity; ``t_z`` is the derivative of the instant in the state before the first transition."""
     for i in range(n):
-        slip = R_t[i] - f_plus[i]
+        slip, size = R_t[i] - f_plus[i], fabs(R_t[i]) + fabs(f_plus[i]) + fabs(f_minus[i])
         for j in range(n):
             slip += R[i, j] * f_minus[j]
-        for c in range(n):
-            A[i, c] = slip * t_z[c]
+            size += fabs(R[i, j] * f_minus[j])
+        for c in range(n):  # where nothing changes it does not matter when
+            A[i, c] = slip * t_z[c] if fabs(slip) > NEAR * size else 0.0
     add_product(R, S, n, n, A)
     for i in range(n):
         for c in range(n):
