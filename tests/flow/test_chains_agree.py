@@ -110,7 +110,7 @@ def test_sampled_courses_and_restarted_runs(seed: int) -> None:
     assert apart_by_restarts(seed) < 1e-9
 
 
-@pytest.mark.parametrize("seed", [3])
+@pytest.mark.parametrize("seed", [3, 169])
 def test_smooth_courses_and_restarted_runs(seed: int) -> None:
     assert apart_by_restarts(seed, smooth=True) < 1e-9
 

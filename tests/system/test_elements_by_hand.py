@@ -172,6 +172,20 @@ def test_a_mass_leaves_its_plate_where_its_friction_turns_round(method: str) -> 
 
 
 @pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
+@pytest.mark.parametrize("speed", [-1e-12, -1e-16, -1e-17, -1e-30, 0.0, 1e-17, 1e-12])
+def test_two_masses_that_friction_holds_stay_whatever_the_rounding_of_their_speeds(speed: float, method: Any) -> None:
+    """Pushed together by .2 and -.1, which leaves .1 for a friction of .5."""
+    elements = {
+        "between": ns.elements.Stop(at={"q1": 1.0, "q2": -1.0}, position=0.3),
+        "rail": ns.elements.Coulomb(at="q1", friction=0.5),
+    }
+    loads, zeros = {"q1": 0.2, "q2": -0.1}, np.zeros((2, 2))
+    pair = ns.mechanical(np.eye(2), zeros, zeros, forcing=loads, parameters={}, elements=elements)
+    run = ns.simulate(pair, duration=2.0, start={"q1": 0.3, "q2": 0.0, "v_q2": speed}, method=method)
+    np.testing.assert_allclose(run.u.values[-1], [0.3, 0.0, 0.0, 0.0], atol=3e-12)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize("speed", [0.0, 4.8e-49, 1e-20, 1e-16, 1e-12, 5e-11, 1e-9])
 def test_a_contact_that_parts_by_less_than_rounding_holds(speed: float, restitution: float, method: Any) -> None:

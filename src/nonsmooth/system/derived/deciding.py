@@ -111,8 +111,12 @@ class _Instant(Instant):
         """Those that hold and those that let go, with the rates as they are now.
 
         Where a place decides, or contacts part by less than rounding, a slow rate may hold as zero does: the others are
-        asked as if it did, and again with its own where it does not."""
-        slow, own = [k for k in self.frictions if self.speeds[k] and not self._side(k)], self.speeds
+        asked as if it did, and again with its own where it does not. A slip that the march takes for none is none."""
+        from nonsmooth.kernels.series.crossing import NOISE
+
+        still = [k for k in self.frictions if abs(self.speeds[k]) <= NOISE * float(self.make.size(self.rates[k]))]
+        own = self.speeds = self.speeds | dict.fromkeys(still, 0.0)
+        slow = [k for k in self.frictions if own[k] and not self._side(k)]
         near = [k for k in contacts if 0.0 < own[k] < PARTING * float(self.make.size(self.rates[k])) and self._meets(k)]
         while True:
             self.speeds = self._stilled(own, slow) | dict.fromkeys(near, 0.0)
