@@ -22,8 +22,8 @@ def snap(C, m, n, n_indicators, h, scale, measured, near, side):
     ``side`` becomes the sign of the first coefficient that does not vanish (0: the indicator vanishes identically).
     ``measured`` is the size of indicators known to be zero here, their rounding error, seen; -1 of those known not to
     be. Others share its relative size: where a stick ends, the speed begins with a slope that is the indicator that
-    ended it. ``near`` are the first
-    coefficients with all that they are computed from off by about ``OFF``, which shows the size of their terms.
+    ended it. ``near`` are the first coefficients with all that they are computed from off by about ``OFF``, which shows
+    the size of their terms.
     """
     seen = 0.0
     for i in range(n_indicators):
