@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.attractors.settled import Settled
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, KernelMarch, State, flag
-from nonsmooth.flow.engines.loop import end_if_not_wanted
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, KernelMarch, State, end_if_not_wanted, flag
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.codes import BEGUN, STARTS, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept

@@ -190,3 +190,9 @@ def flag() -> Any:
     if not hasattr(_of_thread, "flag"):
         _of_thread.flag = np.zeros(1, dtype=np.int64)
     return _of_thread.flag
+
+
+def end_if_not_wanted() -> None:
+    """Raise KeyboardInterrupt where the work of this thread is not wanted any more."""
+    if flag()[0]:
+        raise KeyboardInterrupt

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, KernelMarch, State, TrajectoryLog, flag
+from nonsmooth.arrays import FloatArray
+from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, KernelMarch, State, TrajectoryLog, end_if_not_wanted
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.codes import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept, Section
@@ -144,7 +145,7 @@ class Engine(ABC):
         """The memory of the motion in the kernels' work: behind the states, or where an engine has it."""
         return np.asarray(work.w[len(self.scale) :][: len(self.traced.m)])
 
-    def note_zeros(self, mode: int, numbers: Numbers, pattern: Pattern, work: Any) -> None:  # noqa: B027  the exact flow judges as they do
+    def note_zeros(self, mode: int, numbers: Numbers, pattern: Pattern, work: Any) -> None:  # noqa: B027  an exact flow judges alike
         """Let a march take for zero in the mode behind an answer what is zero by the numbers asked, nothing else."""
 
     def step_in(self, mode: int, system: Any) -> float:
@@ -305,12 +306,6 @@ class Engine(ABC):
             clearances,
             int(code),
         )
-
-
-def end_if_not_wanted() -> None:
-    """Raise KeyboardInterrupt where the work of this thread is not wanted any more."""
-    if flag()[0]:
-        raise KeyboardInterrupt
 
 
 def _samples(instants: FloatArray, n: int, n_memory: int) -> list[Any]:

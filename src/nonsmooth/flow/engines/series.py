@@ -17,7 +17,6 @@ from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
 from nonsmooth.kernels.hybrid.codes import LENGTH, METHODS
-from nonsmooth.system.derived.impacts import is_zero
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.generate import CompiledModel
@@ -139,7 +138,7 @@ class SeriesEngine(Engine):
     def note_zeros(self, mode: int, numbers: Numbers, pattern: Pattern, work: Any) -> None:
         meets = self.net.meets[self.net.meets_start[mode] : self.net.meets_start[mode + 1]]
         for f, (_, one) in zip(meets, numbers.make.meetings(numbers.mode, pattern), strict=True):
-            work.measured[f] = abs(numbers.value(one.value)) if is_zero(numbers, one.value) else -1.0
+            work.measured[f] = -1.0 if numbers.number(one.value) else abs(numbers.value(one.value))
 
     def step_in(self, mode: int, system: Any) -> float:
         return float(system[3].memo[LENGTH])

@@ -321,7 +321,7 @@ def instant_of(n_rows, row, scale, timing, seen, out):
             size += fabs(h_z) * scale[i]
             change += h_z * f[i]
             across += h_z * h_z
-        steepness = fabs(change) / sqrt(across * speed) if across * speed > 0.0 else inf if change != 0.0 else 0.0
+        steepness = fabs(change) / sqrt(across * speed) if across * speed > 0.0 else inf
         distance = fabs(out[at]) / size if size > 0.0 else inf
         if distance <= NEAR:
             distance = -min(steepness, 1.0)

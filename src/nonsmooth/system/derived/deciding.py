@@ -24,9 +24,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.kernels.series.crossing import NOISE  # by which a march judges
 from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
 from nonsmooth.system.derived.faces import is_symmetric, least
-from nonsmooth.system.derived.impacts import ZERO, Instant
+from nonsmooth.system.derived.impacts import Instant
+from nonsmooth.system.derived.instants import ZERO
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
@@ -112,8 +114,6 @@ class _Instant(Instant):
 
         Where a place decides, or contacts part by less than rounding, a slow rate may hold as zero does: the others are
         asked as if it did, and again with its own where it does not. A slip that the march takes for none is none."""
-        from nonsmooth.kernels.series.crossing import NOISE
-
         still = [k for k in self.frictions if abs(self.speeds[k]) <= NOISE * float(self.make.size(self.rates[k]))]
         own = self.speeds = self.speeds | dict.fromkeys(still, 0.0)
         slow = [k for k in self.frictions if own[k] and not self._side(k)]
@@ -141,8 +141,6 @@ class _Instant(Instant):
 
     def _meets(self, k: int) -> bool:
         """Return whether a contact that parts would be no farther than rounding before it meets again."""
-        from nonsmooth.kernels.series.crossing import NOISE  # by which the march judges
-
         element = self.parts[k].element
         if element.held[0] not in element.phases:
             return False

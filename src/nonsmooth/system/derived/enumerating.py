@@ -18,9 +18,9 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.system.derived.faces import as_sums, independent, weakest
+from nonsmooth.system.derived.instants import ZERO
 
 MOST = 4096  # combinations that are tried
-ZERO = 1e-11  # of the sum of the terms
 SAME = 1e-9  # of the sizes of rates: two motions that differ by less are one
 ORDERS = 24
 OPEN, HELD = 0, 2  # contact states; a slip is 1 or -1

@@ -13,13 +13,14 @@ Compression ends where v_n = 0, with the work W = int v_n dp; the impact ends wh
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.system.derived.elements.element import CREEP, SMALL
 from nonsmooth.system.derived.faces import least
+from nonsmooth.system.derived.instants import ZERO
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
@@ -27,13 +28,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.instants import Numbers
 
 
-ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
 ROUNDS = 10_000  # of impacts one after the other
-
-
-def is_zero(numbers: Numbers, expression: Any) -> bool:
-    """Return whether the value of an expression is rounding of its terms."""
-    return abs(numbers.value(expression)) <= ZERO * numbers.terms(expression)
 
 
 class Instant:
@@ -51,8 +46,8 @@ class Instant:
         self.rates = {k: self.make.rate(k, self.mode) for k in bearing}
         self.still = still = {k for k in bearing if self.holds(k) and self._is_still(k)}
         zero = {k for k in bearing if k in met and self.parts[k].where is self.rates[k]} | still
-        self.speeds = {k: 0.0 if k in zero else self.number(self.rates[k]) for k in bearing}
-        self.places = {k: 0.0 if k in still or k in met else self.number(self.parts[k].where) for k in bearing}
+        self.speeds = {k: 0.0 if k in zero else numbers.number(self.rates[k]) for k in bearing}
+        self.places = {k: 0.0 if k in still or k in met else numbers.number(self.parts[k].where) for k in bearing}
         self.pressed: dict[int, bool] = {}
         self.stops = {r: k for k, r in self.make.rubbing.items()}
         self.rubbed: tuple[tuple[int, ...], FloatArray] | None = None
@@ -63,10 +58,6 @@ class Instant:
         it."""
         both = ((self.rates[k], CREEP), (self.parts[k].where, SMALL))
         return all(abs(self.numbers.value(one)) <= part * float(self.make.size(one)) for one, part in both)
-
-    def number(self, expression: Any) -> float:
-        """The value of an expression, 0 where it is rounding."""
-        return 0.0 if is_zero(self.numbers, expression) else self.numbers.value(expression)
 
     def place(self, k: int) -> Place:
         return self.make.place(k, self.mode, self.pattern)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.expressions import Expressions
     from nonsmooth.system.derived.rows import Rows
 
+ZERO = 1e-11  # of the sum of its terms: what is smaller is zero
 ROUNDING = 1e-12  # of the terms of an effect: below it there is none
 OFF = 1e-7  # of numbers, to see their sizes
 
@@ -58,6 +59,11 @@ class Numbers(ABC):
     @abstractmethod
     def value(self, expression: Any) -> float:
         """The value of an expression."""
+
+    def number(self, expression: Any) -> float:
+        """The value of an expression, 0 where it is rounding."""
+        total = self.value(expression)
+        return total if abs(total) > ZERO * self.terms(expression) else 0.0
 
     @abstractmethod
     def terms(self, expression: Any) -> float:
