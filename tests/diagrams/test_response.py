@@ -55,10 +55,19 @@ def test_jumps_of_a_bistable_motion() -> None:
         (np.array([1.0]), []),
         (np.array([1.0, 2.0]), []),
         (np.r_[1.0, 1.01, np.nan, 1.03, 1.04, 3.0, 3.01], [4]),
+        (np.r_[1.0, 1.01, 1.02, np.nan, np.nan, 3.0, 3.01, 3.02], [2]),  # as much as over three steps
+        (np.r_[1.0, 1.01, np.nan, np.nan, np.nan, np.nan, 1.06, 1.07], []),
     ],
 )
 def test_jumps_stand_out_from_their_neighbours(amplitude: np.ndarray, found: list[int]) -> None:
-    assert jumps_in(amplitude) == found
+    assert [i for i, _ in jumps_in(np.arange(float(len(amplitude))), amplitude)] == found
+
+
+def test_a_jump_beside_a_point_that_failed() -> None:
+    """Points without an amplitude are passed over: the jump is as wide as they leave it."""
+    x = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6])
+    assert jumps_in(x, np.array([1.0, 1.01, 1.02, np.nan, 0.3, 0.29, 0.28])) == [(2, 4)]
+    assert jumps_in(np.array([1.0, 1.1, 1.2, 2.2, 2.3, 2.4]), np.array([1.0, 1.1, 1.2, 2.2, 2.3, 2.4])) == []
 
 
 def test_directions_and_starts_of_a_response() -> None:

@@ -461,6 +461,13 @@ def test_a_channel_in_another_unit_is_told_of_unless_its_gain_is_given(recwarn):
     found = ns.fit(mass, x, ["c", "k"], measured={"x": ns.Sensor("disp", gain=1e3)}, tries=1, progress=False)
     assert not [one for one in recwarn if "the model in" in str(one.message)]
     assert [found["c"], found["k"]] == pytest.approx([0.2, 4.0], rel=1e-6)
+    with pytest.warns(UserWarning, match="is in mm, the model in m, and that is 1000 of the former .* gain is 0.001"):
+        problem_of(mass, x, ["c", "k"], {"measured": {"x": ns.Sensor("disp", gain=1e-3)}})
+    recwarn.clear()
+    volts = x.assign(disp=("time", x["disp"].values, {"units": "V"}))
+    for recording, gain in ((volts, 0.02), (metres, 0.97)):  # any gain between other things; a calibration
+        problem_of(mass, recording, ["c", "k"], {"measured": {"x": ns.Sensor("disp", gain=gain)}})
+    assert not [one for one in recwarn if "the model in" in str(one.message)]
 
 
 def test_a_trial_that_begins_with_an_impact_has_no_derivatives_and_ends_no_fit():

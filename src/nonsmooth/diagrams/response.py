@@ -51,8 +51,9 @@ def frequency_response(
 
     Notes
     -----
-    A jump is a step between neighbouring values in which the amplitude changes by more than 0.5 % and more than five
-    times as much as in the steps before and after it. Each state and output is asked by itself, so
+    A jump is a step between neighbouring values in which the amplitude changes by more than 0.5 %, and more than five
+    times as fast as in the steps before and after it. Points without an amplitude (the run failed) are passed over: the
+    step across them is as wide as they leave it. Each state and output is asked by itself, so
     that a jump may stand for some of them only; between points whose ``period_number`` is 0 it may be the scatter of
     chaos.
     """
@@ -100,8 +101,8 @@ def _response(system: System, swept: xr.Dataset, parameter: str) -> xr.Dataset:
         for d, word in enumerate(np.atleast_1d(swept["direction"].values))
         for k in range(height.shape[1])
         for order in [np.argsort(-x if word == "down" else x, kind="stable")]
-        for i in jumps_in(height[d, k, order])
-        for a, b in [(order[i], order[i + 1])]
+        for i, j in jumps_in(x[order], height[d, k, order])
+        for a, b in [(order[i], order[j])]
     ]
     kinds = {
         "variable": str,
@@ -118,14 +119,14 @@ def _response(system: System, swept: xr.Dataset, parameter: str) -> xr.Dataset:
     return with_short_record(result.assign_attrs(attribute(record)))
 
 
-def jumps_in(amplitude: FloatArray) -> list[int]:
-    """Indices i where the amplitude (P,) jumps from point i to point i + 1."""
-    change = np.abs(np.diff(amplitude))
-    n = len(change)
+def jumps_in(x: FloatArray, amplitude: FloatArray) -> list[tuple[int, int]]:
+    """Neighbouring points (P,) between which the amplitude jumps; those without an amplitude are passed over."""
+    known = np.flatnonzero(np.isfinite(amplitude))
+    a = amplitude[known]
+    change, width = np.abs(np.diff(a)), np.maximum(np.abs(np.diff(np.asarray(x, float)[known])), 1e-300)
     found = []
-    for i in range(n):
-        beside = [change[j] for j in (i - 1, i + 1) if 0 <= j < n]
-        enough = change[i] > LEAST * max(abs(amplitude[i]), abs(amplitude[i + 1]))
-        if enough and beside and change[i] > STEEPER * max(beside):
-            found.append(i)
+    for i, slope in enumerate(slopes := change / width):
+        beside = [slopes[j] for j in (i - 1, i + 1) if 0 <= j < len(slopes)]
+        if beside and change[i] > LEAST * max(abs(a[i : i + 2])) and slope > STEEPER * max(beside):
+            found.append((int(known[i]), int(known[i + 1])))
     return found

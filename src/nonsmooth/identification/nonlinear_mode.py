@@ -93,6 +93,10 @@ class NonlinearMode:
     def response(self, force: float, *, points: int = 400, low: float | None = None) -> xr.Dataset:
         """The response to a force of constant amplitude, along its curve: up one side, over the top, down the other.
 
+        The curve is the one that begins at the least amplitude, up to the first amplitude at which the force does not
+        reach the damping any more. Detached curves (isolas) above it, which a damping that falls again with the
+        amplitude allows, are left out; with ``low`` inside of one it is that one, from there upwards.
+
         Parameters
         ----------
         force : float

@@ -21,6 +21,7 @@ from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.arguments import checked, declared
 from nonsmooth.system.kinds import at_least, real_number
 from nonsmooth.system.system import System
+from nonsmooth.system.variant import Tried
 
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 
@@ -94,7 +95,8 @@ def propagate(
         extremes of their motions). Jumps and special points are matched by kind and nearness:
         ``jump_value_draws`` and ``special_value_draws`` over ``draw``, their ``_quantiles`` and ``_share``. With
         ``first_order``:
-        ``special_slope`` over ``special`` and ``source`` (g), and ``special_first_order`` (the standard uncertainty).
+        ``special_slope`` over ``special`` and ``source`` (g), and ``special_first_order`` (the standard uncertainty;
+        NaN, with a warning, where a branch for changed parameters does not show the point again).
         ``drawn_<name>`` are the draws, ``failed`` says how many the verb refused.
 
     Raises
@@ -234,9 +236,17 @@ def to_first_order(
     for i, (name, error) in enumerate(sources):
         if (lost := np.isnan(slope[:, i])).any():  # of equilibria: by differences of whole branches
             value, h = system.values[name], DIFFERENCE * error
-            ends = [call(system.with_parameters({name: value + sign * h}), coarse=True) for sign in (1, -1)]
+            ends = [call(system.with_parameters(Tried({name: value + sign * h})), coarse=True) for sign in (1, -1)]
             ahead, behind = (matched(branch, one, "special") for one in ends)
             slope[lost, i] = ((ahead - behind) / (2 * h))[lost]
+    for i, name in zip(*np.nonzero(np.isnan(slope)), strict=True):
+        kind, at = table["kind"].values[i], float(table[own].values[i])
+        warnings.warn(
+            f"special_first_order is NaN for the {kind} at {own} = {at:.6g}: it has no curve of its own, and with "
+            f"{sources[name][0]} changed by {DIFFERENCE:g} standard uncertainties the branch shows no {kind} beside it",
+            RuntimeWarning,
+            stacklevel=4,
+        )
     variance = np.einsum("si,ij,sj->s", slope, covariance, slope)
     unit = system.parameters[own].unit or "1"
     return {

@@ -61,6 +61,7 @@ class Description:
     symmetry: Symmetry | None = None
     explicit_time: bool = False  # depends on the time, and not periodically
     ranges: tuple[tuple[sp.Expr, str], ...] = ()  # of the parameters: what must not be negative, and what to say
+    limits: tuple[tuple[sp.Expr, str], ...] = ()  # the same of what is given; a fit may try what lies beyond
     plain: Callable[[], tuple[Traced, tuple[TracedSurface, ...]]] | None = field(
         default=None, compare=False, repr=False
     )  # without elements
@@ -216,6 +217,7 @@ def describe(
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
         explicit_time=explicit,
         ranges=tuple(made.get("ranges", ())),
+        limits=tuple(made.get("limits", ())),
         plain=made.get("plain"),
         relays=made.get("relays", False),
         loads=loads,

@@ -145,8 +145,9 @@ def _content(d: Description) -> dict[str, Any]:
         content["elements"] = {k: _element_content(one, text) for k, one in known.items()}
     if d.loads is not None:
         content["loads"] = _loads_content(d.loads, d, text)
-    if d.ranges and not known:
-        content["ranges"] = [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges]
+    for name, asked in () if known else (("ranges", d.ranges), ("limits", d.limits)):
+        if asked:
+            content[name] = [{"not negative": text(e), "else": sentence} for e, sentence in asked]
     if d.bands:
         content["bands"] = {d.traced.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
     return content
@@ -340,10 +341,13 @@ class _Reader:
 
     def within_ranges(self, system: System) -> System:
         """The system with what its parameters must fulfil beyond what its equations say."""
-        ranges = [(self.expression(e["not negative"]), e["else"]) for e in self.content.get("ranges", [])]
-        if not ranges:
+        ranges, limits = (
+            tuple((self.expression(e["not negative"]), e["else"]) for e in self.content.get(name, []))
+            for name in ("ranges", "limits")
+        )
+        if not (ranges or limits):
             return system
-        description = replace(system._description, ranges=tuple(ranges), variants={})
+        description = replace(system._description, ranges=ranges, limits=limits, variants={})
         return type(system)._make(description, dict(system.values), variant_of(description))
 
     def with_loads(self, system: System) -> System:

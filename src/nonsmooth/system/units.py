@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from math import pi
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -63,6 +64,25 @@ def read_unit(text: str) -> Unit | None:
         elif mark == "/":
             sign = -1
     return product(*found) if len(outer) == 1 and sign == 1 else None
+
+
+_PREFIXES = {"n": 1e-9, "u": 1e-6, "\N{MICRO SIGN}": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
+_SCALED: dict[str, tuple[float, Unit]] = {"g": (1e-3, {"kg": 1}), "kg": (1.0, {"kg": 1}), "deg": (pi / 180, {})}
+
+
+def ratio(one: Unit, other: Unit) -> float | None:
+    """Return how many of another unit are one of this (``mm`` to ``m``: 1e-3); None where they measure other things."""
+    factor, left = 1.0, dict[str, float]()
+    for unit, turned in ((one, 1), (other, -1)):
+        for name, power in unit.items():
+            size, base = _SCALED.get(name, (1.0, {name: 1}))
+            if name[1:] in (*_DERIVED, "m", "s", "g", "V", "A", "K") and name[0] in _PREFIXES and name not in _SCALED:
+                more, base = _SCALED.get(name[1:], (1.0, _DERIVED.get(name[1:], {name[1:]: 1})))
+                size = _PREFIXES[name[0]] * more
+            factor *= size ** (turned * power)
+            for key, of in base.items():
+                left[key] = left.get(key, 0) + turned * power * of
+    return None if any(left.values()) else factor
 
 
 def product(*units: Unit | None) -> Unit | None:

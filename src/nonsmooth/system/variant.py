@@ -54,7 +54,7 @@ class Variant:
             **{name: parameter.symbol for name, parameter in description.parameters.items()},
             **{name: r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}" for name, of in self.etas},
         }
-        self.domain = Domain(self.traced, (*description.ranges, *extra))
+        self.domain = Domain(self.traced, (*description.ranges, *extra), description.limits)
         tables = {
             "states": description.states,
             "memory": {name: unit for name, (_, unit) in self.memory.items()},
@@ -221,10 +221,18 @@ class Derivatives:
         return sp.expand(before.diff(t.t) + flow)
 
 
+class Tried(dict[str, float]):
+    """Values of parameters that a fit tries: to a small friction it may come from beyond zero."""
+
+    covariance = None
+
+
 def changed_values(
     variant: Variant, values: Mapping[str, float], name: str, given: Any, named: Mapping[str, float]
 ) -> dict[str, float]:
-    """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it."""
+    """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it.
+
+    What a fit tries or has found (it has a ``covariance``) is not held to what is asked of values that are given."""
     changes = dict(named)
     if given is not None:
         mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
@@ -243,7 +251,7 @@ def changed_values(
     for key, _ in variant.etas:
         if key in changes:
             _positive(new[key], key)
-    variant.domain.check(new, changes)
+    variant.domain.check(new, changes, tried=hasattr(given, "covariance"))
     return new
 
 

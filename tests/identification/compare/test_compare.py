@@ -134,6 +134,8 @@ def test_a_response_with_its_jumps(tmp_path: Path) -> None:
     )
     found = compare(measured, MODEL, settings=settings, transient=200)
     assert np.abs(found["relative_difference"]).max() < 1e-6
+    amplitudes = ("measured_amplitude", "measured_amplitude_error", "theory_amplitude", "theory_at_run")
+    assert [found[name].attrs["units"] for name in amplitudes] == ["m"] * 4
     assert found["jump_direction"].values.tolist() == ["up", "down"]
     assert (np.abs(found["jump_difference"]) <= found["jump_tolerance"]).all()
     ns.save(found, tmp_path / "response.nc")

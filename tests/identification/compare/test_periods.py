@@ -8,6 +8,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.compare.draws import draw_systems, read_settings
+from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
 from nonsmooth.identification.compare.response import AmplitudeJump, match_jumps
 
@@ -24,6 +25,25 @@ def test_periodic_points(p: int) -> None:
     found = measured_period(noisy(np.resize(cycle, (120, 2))), NOISE)
     assert found.number == p
     assert found.returns[p - 1] == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.parametrize("p", [1, 2, 3])
+@pytest.mark.parametrize("rate", [20.2, 20.25, 31.3])
+def test_a_section_at_an_impact_takes_no_period_from_the_samples(p: int, rate: float) -> None:
+    """Flights y = h s (1 - s), one a period, of heights that return after p: samples return after others."""
+    turns = np.arange(int(60 * rate)) / rate
+    heights = np.array([1.0, 0.6, 0.3])[:p]
+
+    def motion(at: np.ndarray) -> np.ndarray:
+        s, h = at % 1.0, heights[np.floor(at).astype(int) % p]
+        return np.column_stack([h * s * (1.0 - s), h * (1.0 - 2.0 * s)])
+
+    noise = np.full(2, 1e-4)
+    u = noisy(motion(turns), noise=noise)
+    for at in (0.0, 0.3 / rate, -0.7 / rate, 0.4):  # the section lies that far behind an impact
+        folded = fold(turns - at, u, 64)
+        assert measured_period(folded, noise).number == p
+    assert measured_period(fold(turns, u, 64)[:, 0], noise).number != p  # the section alone does not tell
 
 
 def test_chaos_has_none() -> None:

@@ -21,6 +21,7 @@ from nonsmooth.continuation.problems.visits import anchored, led
 from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced, TracedTransition
 
 BEFORE_REST = 1e-4  # of the period: flights after an impact as slow as impacts are followed are shorter
+TURNS = 1e-10  # of the period: a touch as near to the end of its visit lies in the crossing there
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
@@ -47,12 +48,16 @@ class Change:
 
 
 def inserted(point: OrbitPoint) -> list[Change]:
-    """The orbit with the transition that it touches, and if that leads to another mode with each of the ways back."""
+    """The orbit with the transition that it touches, and if that leads to another mode with each of the ways back.
+
+    None where it touches in a crossing: that lies in the contact then, and is another transition there."""
     path, flow, values, traced = point.path, point.shooting.flow, point.values, point.shooting.system.traced
     free = point.once
     place, k = path.touched
     row = int(path.which[place, k] - point.curve.walk.net.row_start[k])
-    t, begin = float(path.place[place, k]), float(point.solved.times[place])
+    t, (begin, end) = float(path.place[place, k]), map(float, point.solved.times[place : place + 2])
+    if place < point.shooting.m and end - t < TURNS * point.period:
+        return []
     z = led(flow, values, free.signature.visits[place].mode, begin, t - begin, free.states[place])
     indicator = traced.transitions[k].rows[row].indicator
 

@@ -342,9 +342,11 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, end: Met | Non
         sides.insert(0 if _is_better(met[0], end.point) else 1, end)
     kind, point = sides[0].kind, sides[0].point
     own = [change.indicator for side in sides for change in side.kind.contacts(side.point)]
-    touches = sliding in TOUCHES if sliding else own or any(side.name == "grazing" for side in sides)
-    name = name or ("grazing" if touches else "corner")
     indicator = own[0] if own else kind.surface(point, beyond)
+    touches = sliding in TOUCHES if sliding else own or kind.touches(point, indicator)
+    name = name or ("grazing" if touches else "corner")
+    if name == "grazing":  # the orbit without the contact
+        point = min((side.point for side in sides), key=lambda one: one.shooting.m)
     found.mark(name, point, indicator=names[indicator] if indicator >= 0 else "", sliding=sliding)
     return name
 

@@ -6,7 +6,8 @@ The equations of the orbit, F(X, p_1, p_2) = 0, and one more, psi = 0:
 fold                      det F_X (scaled)
 flip                      det(M + I)
 neimark_sacker            :math:`\prod_{i<j} (\mu_i \mu_j - 1)`
-grazing                   largest local maximum of the margin that is touched
+grazing                   largest local maximum of the margin that is touched;
+                          where motion turns in a crossing, its value there
 ========================  ====================================================
 
 psi is differentiated by central differences, in the unknowns and in both parameters.
@@ -17,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,17 @@ from nonsmooth.continuation.problems.solve import determinant
 STEP = 1e-6  # of central differences, in scaled unknowns
 KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's method
 CLOSE = 2e-12
+AT = 1e-4  # of the period: a maximum as near to a crossing may be that crossing
+ALIKE = 1e-9  # of a gradient: what two differ by
+
+
+class Touched(NamedTuple):
+    """The touch of a grazing curve."""
+
+    conditions: list[int]  # the transitions that need what is touched
+    row: int  # of the transition table: what is touched
+    when: float  # in periods
+    turn: tuple[int, int] | None  # transition and row of the crossing in which motion turns, and the touch with it
 
 
 class Locus(Orbits):
@@ -55,7 +67,7 @@ class Locus(Orbits):
         self._eye = np.eye(shooting.n)
         self._unit = 1.0  # of psi
         self._gradient: tuple[FloatArray, FloatArray] | None = None  # the last one, and its place
-        self._touched: tuple[list[int], float] | None = None  # what a grazing curve's touch is of, and when, in periods
+        self._touched: Touched | None = None
 
     def psi(self, solved: Solved) -> float:
         """The number that vanishes on the locus."""
@@ -64,15 +76,20 @@ class Locus(Orbits):
             sign, size = determinant(solved.jacobian[:, :n] * self.rows[:, None] * self.scale[:n])
             return sign * float(np.exp(size)) / self._unit
         if self.kind == "grazing":
-            path = self.walk.along(solved, self.shooting.split(solved.X)[1])
-            if path is None:
+            turns = self._touched is not None and self._touched.turn is not None
+            path = None if turns else self.walk.along(solved, self.shooting.split(solved.X)[1])
+            if path is None and not turns:
                 return np.nan
-            visits, conditions, _ = self._touch(path, float(solved.times[-1]))
-            margins = path.inner[np.ix_(visits, conditions)]
+            visits, touched = self._touch(path, solved)
+            if touched.turn is not None or path is None:
+                (indicator, sign), i = self.walk.net.rows[touched.row, :2], visits[0]
+                at = int(indicator), int(self.shooting.modes[i]), float(solved.times[i + 1]), solved.segments.z[i]
+                return float(sign * self.shooting.flow.indicator(solved.values, *at).h) / self._unit
+            margins = path.inner[np.ix_(visits, touched.conditions)]
             if len(visits) > 1:  # at the section itself no maximum shows within them
-                margins = np.vstack([margins, path.section[conditions]])
+                margins = np.vstack([margins, path.section[touched.conditions]])
             largest = float(margins.max())
-            if np.isneginf(largest) and (path.which[np.ix_(visits, conditions)] >= 0).any():
+            if np.isneginf(largest) and (path.which[np.ix_(visits, touched.conditions)] >= 0).any():
                 return 0.0  # a maximum so near to zero that it has no sign
             return largest / self._unit
         M = solved.monodromy
@@ -83,6 +100,7 @@ class Locus(Orbits):
     def calibrate(self, Y: FloatArray) -> None:
         """Choose the unit of psi so that its gradient is of order one."""
         self._unit = 1.0
+        self.psi(self.evaluate(Y))  # what is touched is seen at the point itself
         size = float(np.abs(self.gradient(Y)).max())
         self._unit = size if np.isfinite(size) and size > 0 else 1.0
 
@@ -132,23 +150,44 @@ class Locus(Orbits):
         """The orbit; on a grazing curve its touch is expected here from now on."""
         found = super().described(point)
         if found is not None and self.kind == "grazing":
-            self._touched = self._touch(found.path, found.period)[1:]
+            self._touched = self._touch(found.path, found.solved)[1]
         return found
 
-    def _touch(self, path: Path, period: float) -> tuple[list[int], list[int], float]:
-        """The visits in which the touch of a grazing curve lies, two where the section parts one; the transitions whose
-        conditions need what is touched; of these the maximum nearest in time to where it was, whatever visit has it."""
-        if not self._touched:
-            net = self.walk.net
-            needed = (net.rows[:, :2] == net.rows[path.which[path.touched], :2]).all(axis=1)
-            conditions = [k for k, (a, b) in enumerate(pairwise(net.row_start)) if needed[a:b].any()]
-            self._touched = conditions, float(path.place[path.touched]) / period
-        (conditions, was), last = self._touched, self.shooting.m
-        place = path.place[:, conditions] / period
-        apart = np.where(path.which[:, conditions] < 0, np.inf, np.abs((place - was + 0.5) % 1.0 - 0.5))
-        visit, k = divmod(int(apart.argmin()), len(conditions))
+    def _touch(self, path: Path | None, solved: Solved) -> tuple[list[int], Touched]:
+        """The visits in which the touch of a grazing curve lies, two where the section parts one, with it: of all that
+        need what is touched the maximum nearest in time to where it was, or the crossing in which motion turns."""
+        touched, period, last = self._touched, solved.times[-1], self.shooting.m
+        if touched is None:
+            self._touched = touched = self._first_touch(path, solved)
+        if touched.turn is not None or path is None:
+            same = [i for i, v in enumerate(self.shooting.signature.visits) if (v.transition, v.row) == touched.turn]
+            whens = solved.times[1:][same] / period
+            at = int(np.abs((whens - touched.when + 0.5) % 1.0 - 0.5).argmin())
+            return [same[at]], touched._replace(when=float(whens[at]))
+        place = path.place[:, touched.conditions] / period
+        nowhere = path.which[:, touched.conditions] < 0
+        apart = np.where(nowhere, np.inf, np.abs((place - touched.when + 0.5) % 1.0 - 0.5))
+        visit, k = divmod(int(apart.argmin()), len(touched.conditions))
         both = self.shooting.forced and 0 < last and visit in (0, last)
-        return [0, last] if both else [visit], conditions, float(place[visit, k])
+        return [0, last] if both else [visit], touched._replace(when=float(place[visit, k]))
+
+    def _first_touch(self, path: Any, solved: Solved) -> Touched:
+        """The nearest touch of a path. Motion turns in a crossing beside it whose indicator is the rate of what is
+        touched: no maximum lies within a visit there."""
+        net, visits, flow = self.walk.net, self.shooting.signature.visits, self.shooting.flow
+        (visit, _), row = path.touched, int(path.which[path.touched])
+        needed = (net.rows[:, :2] == net.rows[row, :2]).all(axis=1)
+        conditions = [k for k, (a, b) in enumerate(pairwise(net.row_start)) if needed[a:b].any()]
+        when, turn = float(path.place[path.touched]), None
+        for i in {visit - 1, visit} & {*self.walk.conditional.tolist()}:
+            v, t, z = visits[i], float(solved.times[i + 1]), solved.segments.z[i]
+            if abs(t - when) < AT * solved.times[-1]:
+                rate = flow.indicator(solved.values, int(net.rows[row, 0]), v.mode, t, z)
+                fired = flow.jump(solved.values, v.transition, t, z, v.row)
+                a, b = np.append(rate.L_z, rate.L_t), np.append(fired.h_z, fired.h_t)
+                if np.abs(a * (b @ b) - b * (a @ b)).max() <= ALIKE * np.abs(a).max() * (b @ b):
+                    turn = v.transition, v.row
+        return Touched(conditions, row, when / float(solved.times[-1]), turn)
 
     def renewed(self, point: OrbitPoint) -> OrbitPoint | None:
         """The phase condition put through the last point; the units stay, psi was calibrated in them."""
@@ -162,7 +201,14 @@ class Locus(Orbits):
         """Margins of the path to its boundaries; on a grazing curve by touches of other surfaces than its own."""
         path = point.path
         if self.kind == "grazing":
+            visits, (conditions, _, _, turn) = self._touch(path, point.solved)
             inner = path.inner.copy()
-            inner[np.ix_(*self._touch(path, point.period)[:2])] = -np.inf
+            inner[np.ix_(visits, conditions)] = -np.inf
+            if turn is not None:  # reached as the visit ends, and as the next one begins
+                i, others, landed = visits[0], path.others.copy(), path.landed.copy()
+                inner[i + 1, conditions] = -np.inf
+                others[i] = -np.inf if path.other[i] in conditions else others[i]
+                landed[i + 1] = -np.inf if path.landing[i + 1] in conditions else landed[i + 1]
+                path = replace(path, others=others, landed=landed)
             path = replace(path, touch=float(inner.max(initial=-np.inf)))
         return path.margins

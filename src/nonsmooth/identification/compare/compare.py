@@ -159,7 +159,8 @@ def compare(
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
 
-        variables = compare_response(measured, model, name=name, state=states[0])
+        own = _state_units(model)[states[0]]
+        variables = compare_response(measured, model, name=name, state=states[0], own=own)
     elif kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
 
@@ -253,6 +254,13 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
     return values
 
 
+def _state_units(model: Model) -> dict[str, str]:
+    """The units of the theory's states."""
+    if model.system is not None:
+        return dict(model.system.states)
+    return dict(zip(model.theory["state"].values.tolist(), model.theory["state_unit"].values.tolist(), strict=True))
+
+
 def _swept(measured: xr.Dataset) -> str:
     others = [str(dim) for dim in measured["section"].dims if dim not in ("iterate", "state")]
     if len(others) != 1:
@@ -275,16 +283,15 @@ def _dataset(
     theory = model.theory
     if model.system is None:
         record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": model.seed}
-        units = dict(zip(theory["state"].values.tolist(), theory["state_unit"].values.tolist(), strict=True))
     else:
         labels = labels_of(model.system)
         method = str(given.get("method", "auto"))
         record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=model.seed)))
-        units = {name: quantity.unit for name, quantity in labels.states.items()}
         for name, quantity in labels.parameters.items():
             if name not in variables:
                 attributes = {"long_name": name, "units": quantity.unit}
                 variables[name] = ((), float(quantity.value or 0.0), attributes)
+    units = _state_units(model)
     record["measured"] = {key: str(value) for key, value in measured.attrs.items() if key != ATTRIBUTE}
     synthetic = str(measured.attrs.get("synthetic", "no"))
     coords = {

@@ -41,7 +41,7 @@ def compare_motion(
     folded, returns = _measured(measured, phases, model.grid)
     sections = [points[np.isfinite(points).all(axis=1)] for points in returns]
     scale = np.maximum(np.concatenate(sections).std(axis=0), noise)
-    number = measured_period(returns[0], noise, max_period=model.max_period).number
+    number = measured_period(returns[0] if folded is None else folded, noise, max_period=model.max_period).number
     rng = np.random.default_rng(model.seed)
     motions = None
     if model.system is not None:

@@ -50,8 +50,10 @@ def measured_period(
 
     Parameters
     ----------
-    points : array (n, states)
-        In the order in which they came; NaN where one is missing, across which the others keep their places.
+    points : array (n, states) or (n, phases, states)
+        In the order in which they came; NaN where one is missing, across which the others keep their places. Of several
+        phases each has a scaled return, and their median counts: the period is that of the motion, and samples do not
+        tell where it is beside an impact.
     noise : array (states,)
         Standard error of a point in each state; positive.
     max_period : int
@@ -66,10 +68,11 @@ def measured_period(
         Too few points for any period, or a noise that is not positive.
     """
     cloud, sigma = np.asarray(points, float), np.asarray(noise, float)
+    cloud = cloud[:, None] if cloud.ndim == 2 else cloud
     if not (np.isfinite(sigma).all() and (sigma > 0).all()):
         raise ValueError(f"noise must be a positive standard error for each state, got {sigma.tolist()}")
     order = 2 if drifting else 1
-    count = int(np.isfinite(cloud).all(axis=1).sum())
+    count = int(np.isfinite(cloud).all(axis=(1, 2)).sum())
     longest = min(max_period, (count - FEWEST_RETURNS) // order)
     if longest < 1:
         raise ValueError(
@@ -80,8 +83,8 @@ def measured_period(
     for p in range(1, longest + 1):
         change = scaled[p:] - scaled[:-p]
         change = change[p:] - change[:-p] if drifting else change
-        if len(known := change[np.isfinite(change).all(axis=1)]) >= FEWEST_RETURNS:
-            returns[p - 1] = np.sqrt(np.mean(known**2))
+        if len(known := change[np.isfinite(change).all(axis=(1, 2))]) >= FEWEST_RETURNS:
+            returns[p - 1] = np.sqrt(np.median(np.mean(known**2, axis=(0, 2))))
     found = np.flatnonzero(returns <= BOUND)
     return MeasuredPeriod(int(found[0]) + 1 if len(found) else 0, returns)
 

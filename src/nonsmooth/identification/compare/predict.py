@@ -221,7 +221,7 @@ def from_result(model: Model, phases: list[float]) -> Prediction:
         turns = _phase(result)
         whole = fold(turns, result["u"].values, model.grid)
         sections = [fold(turns - phase, result["u"].values, 8)[:, 0] for phase in phases]
-        number = _number(sections[0], model.max_period)
+        number = _number(whole, model.max_period)
         motion = mean_orbit(whole, number)[0] if number else whole[-SHOWN:].reshape(-1, whole.shape[2])
         return Prediction(number, sections, motion, np.array([number]))
     if "section" in result:
@@ -251,5 +251,5 @@ def _phase(result: xr.Dataset) -> FloatArray:
 
 
 def _number(points: FloatArray, max_period: int) -> int:
-    size = np.ptp(points, axis=0)
+    size = np.ptp(points.reshape(-1, points.shape[-1]), axis=0)
     return measured_period(points, EXACT * np.where(size > 0, size, 1.0), max_period=max_period).number

@@ -164,8 +164,10 @@ def _interval(value: float, word: str, drawn: Sequence[Jumps], level: float) -> 
 FINE = 301  # values of the predicted curve
 
 
-def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: str) -> dict[str, Any]:
-    """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
+def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: str, own: str) -> dict[str, Any]:
+    """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each.
+
+    ``own`` is the unit of the state."""
     runs = _runs(measured, name, state)
     unit = measured[name].attrs.get("units", "1")
     directions = [word for word in ("up", "down") if (runs["direction"] == word).any()]
@@ -181,13 +183,13 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
     variables = {
         f"measured_{name}": labelled("run", runs["value"], f"measured {name}", unit),
         "measured_direction": labelled("run", runs["direction"], "direction in which the run was reached"),
-        "measured_amplitude": labelled("run", runs["amplitude"], "measured amplitude"),
-        "measured_amplitude_error": labelled("run", runs["error"], "standard error of it"),
+        "measured_amplitude": labelled("run", runs["amplitude"], "measured amplitude", own),
+        "measured_amplitude_error": labelled("run", runs["error"], "standard error of it", own),
         "measured_period_number": labelled(
             "run", runs["period"], "measured period number (0: none found, -1: not known)"
         ),
-        "theory_amplitude": labelled((name, "direction"), curves, "predicted amplitude"),
-        "theory_at_run": labelled("run", at_runs, "predicted amplitude at the run"),
+        "theory_amplitude": labelled((name, "direction"), curves, "predicted amplitude", own),
+        "theory_at_run": labelled("run", at_runs, "predicted amplitude at the run", own),
         "relative_difference": labelled("run", at_runs / runs["amplitude"] - 1, "prediction over measurement, minus 1"),
         name: labelled(name, values, name, unit),
         "direction": labelled("direction", np.array(directions), "direction of the sweep"),
@@ -204,7 +206,7 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
             stack_runs.append(points)
             drawn_jumps.append(_jumps(values, curve, directions))
         for word, curve in model.band(stack).items():
-            variables[f"theory_{word}"] = labelled((name, "direction"), curve, f"{word} of the band")
+            variables[f"theory_{word}"] = labelled((name, "direction"), curve, f"{word} of the band", own)
         band, reach = model.band(stack_runs), 2 * np.nan_to_num(runs["error"])
         inside = (runs["amplitude"] + reach >= band["low"]) & (runs["amplitude"] - reach <= band["high"])
         variables["inside_band"] = labelled(
@@ -278,7 +280,7 @@ def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jum
     found = {}
     for d, word in enumerate(directions):
         x, heights = (values, curves[:, d]) if word == "up" else (values[::-1], curves[::-1, d])
-        steps = [(x[i : i + 2], heights[i : i + 2].tolist()) for i in jumps_in(heights)]
+        steps = [(x[[i, j]], heights[[i, j]].tolist()) for i, j in jumps_in(x, heights)]
         found[word] = [AmplitudeJump(float(at.mean()), 0.5 * np.ptp(at), *both) for at, both in steps]
     return found
 

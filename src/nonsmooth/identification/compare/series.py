@@ -25,10 +25,10 @@ _NUMBER = "period number (0: none found, -1: too few turns)"
 FEW = 6  # turns of the drive below which no period number is sought
 
 
-def _period_of(motion: xr.Dataset, points: FloatArray, longest: int) -> int:
-    """The period number of a motion's section points; 0: none found, -1: too few turns."""
-    enough = np.isfinite(points).all(axis=1).sum() >= FEW
-    return measured_period(points, _noise(motion), max_period=longest).number if enough else -1
+def _period_of(motion: xr.Dataset, folded: FloatArray, longest: int) -> int:
+    """The period number of a folded motion; 0: none found, -1: too few turns."""
+    enough = np.isfinite(folded).all(axis=(1, 2)).sum() >= FEW
+    return measured_period(folded, _noise(motion), max_period=longest).number if enough else -1
 
 
 def _noise(*motions: xr.Dataset) -> FloatArray:
@@ -62,7 +62,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     heights, errors, periods = [], [], []
     for motion in motions:
         folded = fold(motion["phase"].values, motion["u"].values, 64)
-        periods.append(_period_of(motion, folded[:, 0], 8))
+        periods.append(_period_of(motion, folded, 8))
         whole = folded[:, :, 0]
         whole = whole[min(settle, len(whole) - 1) :]
         whole = whole[np.isfinite(whole).all(axis=1)]
@@ -153,10 +153,10 @@ def measured_sections(
         few turns).
     """
     order = np.argsort(values, kind="stable")
-    clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8)[:, 0] for i in order]
-    points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
+    clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8) for i in order]
+    points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[2]), np.nan)
     for row, cloud in zip(points, clouds, strict=True):
-        row[: len(cloud)] = cloud
+        row[: len(cloud)] = cloud[:, 0]
     numbers = [_period_of(motions[i], cloud, 16) for i, cloud in zip(order, clouds, strict=True)]
     first = motions[0]
     return xr.Dataset(

@@ -18,8 +18,9 @@ from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.kinds import float_array, real_number
 from nonsmooth.system.system import System
-from nonsmooth.system.units import read_unit
+from nonsmooth.system.units import ratio, read_unit
 
+CALIBRATES = 5.0  # a gain farther than this factor from that of two units is none of a calibration
 FORMS = (
     "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "
     "to (t, y), or a list of these"
@@ -93,8 +94,9 @@ def read_records(
     ours = {**system.states, **system.outputs}
     _compare_units("recording", clock, units, "s" if any(system.states.values()) else "", "times in that unit")
     for quantity, sensor in sensors.items():
-        if sensor.gain == 1.0:
-            _compare_units(f"measured[{quantity!r}]", sensor.channel, units, ours[quantity], "Sensor(gain=...)")
+        _compare_units(
+            f"measured[{quantity!r}]", sensor.channel, units, ours[quantity], "Sensor(gain=...)", sensor.gain
+        )
     for name, unit in system.inputs.items():
         one = (inputs or {}).get(name) if isinstance(inputs, Mapping | None) else None
         channel = one.time if isinstance(one, Input) else name if inputs is None else one
@@ -123,16 +125,25 @@ def _units(recording: Any) -> dict[str, str]:
     return {str(name): str(one.attrs.get("units", "")) for name, one in getattr(recording, "variables", {}).items()}
 
 
-def _compare_units(what: str, channel: str, units: Sequence[Mapping[str, str]], ours: str, remedy: str) -> None:
-    """Warn where model and channel, in any of the recordings, are in units that are known and differ."""
+def _compare_units(
+    what: str, channel: str, units: Sequence[Mapping[str, str]], ours: str, remedy: str, gain: float = 1.0
+) -> None:
+    """Warn where model and channel, in any of the recordings, are in units that are known, and differ by another factor
+    than the gain. Beside units of other things any gain but 1 is one."""
     for theirs in dict.fromkeys(one.get(channel, "") for one in units):
         one, other = read_unit(theirs), read_unit(ours)
-        if one is not None and other is not None and one != other:
-            warnings.warn(
-                f"{what}: channel {channel!r} is in {theirs}, the model in {ours}, and numbers are compared as they "
-                f"are; give {remedy}",
-                stacklevel=4,
-            )
+        if one is None or other is None:
+            continue
+        factor = ratio(other, one)
+        if one != other and gain == 1.0:
+            said = "numbers are compared as they are"
+        elif factor is not None and not 1 / CALIBRATES < abs(gain) / factor < CALIBRATES:
+            said = f"that is {factor:.6g} of the former to one of the latter, and the gain is {gain:.6g}"
+        else:
+            continue
+        warnings.warn(
+            f"{what}: channel {channel!r} is in {theirs}, the model in {ours}, and {said}; give {remedy}", stacklevel=4
+        )
 
 
 def _driven(

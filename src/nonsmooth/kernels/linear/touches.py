@@ -3,12 +3,11 @@
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.codes import DONE, MODE, TOUCHES
 from nonsmooth.kernels.hybrid.records import asked_before
-from nonsmooth.kernels.linear.limits import flat
 from nonsmooth.kernels.linear.polynomial import critical_points, curvature_at, horner, monotone
 from nonsmooth.kernels.linear.tables import NODES
 from nonsmooth.kernels.linear.values import at_ends, bound_at, compose, to_node
 
-BESIDE = 1e-6  # of a node spacing: behind the place where a slope is zero within rounding
+BESIDE = 1e-6  # of a node spacing: as near behind the end of a piece a maximum belongs to it
 
 
 @once
@@ -26,7 +25,8 @@ def log_touches(step, form, net, seen, tables, work):
 @once
 def log_maxima(f, sign, step, mode, seen, tables, work):
     """Those of sign * functional: a piece on which it is not certainly monotone is halved, down to two spacings, with
-    the polynomial in the middle. Where the slope is rounding at an end, the maximum belongs to the piece before."""
+    the polynomial in the middle. A maximum just behind an end, where motion turns in a transition, belongs to the piece
+    before."""
     w, wn, wp, wq, scr, points, spacing = work.w, work.wn, work.wp, work.wq, work.scr, work.points, tables.info[mode, 1]
     bound = bound_at(tables, work.row, mode, f, w)
     node, size, n = 0, NODES, work.tally[TOUCHES]
@@ -40,10 +40,7 @@ def log_maxima(f, sign, step, mode, seen, tables, work):
                 size //= 2
                 continue
             lo, hi = -spacing, min(spacing, step - (node + 1) * spacing)
-            if flat(tables, mode, f, wp, work):
-                lo += BESIDE * spacing
-            if flat(tables, mode, f, wq if hi == spacing else work.end, work):
-                hi += BESIDE * spacing
+            lo, hi = lo + BESIDE * spacing, hi + BESIDE * spacing
             to_node(tables, work.row, mode, node + 1, w, wn)
             compose(tables, mode, f, wn, scr, 0)
             count = critical_points(scr, 0, lo, hi, points) if lo < hi else 0

@@ -1,5 +1,7 @@
 """Observations made while a step's polynomials are at hand: extremes and touches."""
 
+from math import fabs
+
 import nonsmooth.kernels.hybrid.codes as place
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.codes import DONE, MODE, TOUCHES
@@ -67,7 +69,8 @@ def finish(form, tables, work, kept):
 def log_touches(step, form, net, log, tables, work):
     """Log every local maximum <= 0 of an armed row on the step.
 
-    ``work.rise`` is the sign of each row's slope at the end of the step before (0: just after a jump)."""
+    ``work.rise`` is the sign of each row's slope at the end of the step before (0: just after a jump). A slope of
+    rounding falls: where motion turns as a step ends, the maximum belongs to that step and not to what follows."""
     C, n, powers, rows, rise = work.C, work.w.shape[0], work.powers, net.rows, work.rise
     a, d, stack, found, u, scale = work.a, work.d, work.stack, work.found, work.dense, work.scale
     m = degree_of(form)
@@ -80,8 +83,10 @@ def log_touches(step, form, net, log, tables, work):
             mr = load(C, n + i, float(sign), m, powers, a)
             cursor, before, begun = 0.0, rise[r], False
             for _ in range(mr):
+                terms = 0.0
                 for k in range(mr):
                     d[k] = (k + 1) * a[k + 1]
+                    terms += fabs(d[k])
                 for k in range(mr, 5):
                     d[k] = 0.0
                 md = mr - 1 if mr > 5 else 4
@@ -90,6 +95,7 @@ def log_touches(step, form, net, log, tables, work):
                     if cursor > 0.0:
                         shift(d, md, cursor, 1.0 - cursor, d)
                         d[0] = 0.0
+                d[0] -= NOISE * terms
                 md = strip(d, md)
                 if md < 0:
                     rise[r] = 0

@@ -23,6 +23,7 @@ PARTS = 8  # of a step of the series: an extremum shows as a change of the slope
 BISECTIONS = 60
 ROUNDING = 1e-13  # of an indicator's size
 BEGUN = 1e-6  # of a step: the square root of rounding
+STILL = 1e-9  # of a slope's terms: an orbit is solved for no better, and where motion turns the slope is zero
 MOST_STEPS = 100_000
 
 _i, _f = types.int64, types.float64
@@ -65,6 +66,16 @@ def size_of(C, m, row, h):
         power *= h
         size = max(size, fabs(C[row, p]) * power)
     return size
+
+
+@device
+def still(C, m, row, slope, h):
+    """Return whether the slope of a row is zero beside its largest term over the local time h."""
+    size, power = 0.0, 1.0
+    for p in range(1, m + 1):
+        size = max(size, p * fabs(C[row, p]) * power)
+        power *= h
+    return fabs(slope) < STILL * size
 
 
 @device
@@ -181,9 +192,13 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
                     begin[leg, k], begin_row[leg, k] = begun, row
                     r = n + rows[row, 0]
                     begin_size[leg, k] = max(size_of(C, order, r, reach), fabs(near[r, 0] - C[r, 0]) / OFF)
+                    if still(C, order, r, rising, min(reach, tau[leg])):  # a maximum there belongs to the visit before
+                        rising = 0.0
                 for part in range(1, PARTS + 1):
                     b = h if part == PARTS else part * width
-                    _, s, _ = margin(C, order, n, net, k, b, -1)
+                    _, s, row = margin(C, order, n, net, k, b, -1)
+                    if part == PARTS and h == left and k != fired[leg]:
+                        s = 0.0 if still(C, order, n + rows[row, 0], s, min(reach, tau[leg])) else s
                     if rising > 0.0 and s <= 0.0:
                         lo, hi = a, b
                         for _ in range(BISECTIONS):

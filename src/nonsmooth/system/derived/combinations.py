@@ -176,7 +176,7 @@ def _written_out(
         "transitions": transitions,
         "indicators": {**given["indicators"], **{key: KnownFunction(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
-        "ranges": make.ranges(next(iter(base))),
+        **dict(zip(("ranges", "limits"), make.ranges(next(iter(base))), strict=True)),
         "kinds": kinds,
         "asked": asked,
         "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None,
@@ -243,7 +243,7 @@ def _opened(
         "transitions": (),
         "indicators": {key: KnownFunction(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
         "outputs": given["outputs"],
-        "ranges": make.ranges(patterns.mode),
+        **dict(zip(("ranges", "limits"), make.ranges(patterns.mode), strict=True)),
         "patterns": patterns,
         "make": make,
     }

@@ -223,20 +223,23 @@ class Expressions(Assembler):
 
     # What a user would have written
 
-    def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
-        """Expressions of the parameters that must not be negative, each with the sentence for where it is.
+    def ranges(self, mode: str) -> tuple[list[tuple[sp.Expr, str]], list[tuple[sp.Expr, str]]]:
+        """Expressions of the parameters that must not be negative, each with the sentence for where it is; and those
+        that only what a fit tries may make so.
 
-        Where a number is, or what must not be with the parameters as they are given, the sentence is raised."""
-        known, found = set(self.symbols.p.values()), []
+        Where one is with the parameters as they are given, the sentence is raised."""
+        known, found, limits = set(self.symbols.p.values()), list[Any](), list[Any]()
         for k in range(len(self.parts)):
             here = self.place(k, mode, (0,) * len(self.parts))
             rows = [(sp.sympify(e), text) for e, text in here.element.ranges(here)]
-            found += [(e, text) for e, text in rows if e.free_symbols and e.free_symbols <= known]
-            given = (*here.element.limits(here), here.effect())
-            for e, sentence in (*rows, *((sp.sympify(sp.sympify(e).xreplace(self.values)), text) for e, text in given)):
+            given = [(sp.sympify(e), text) for e, text in here.element.limits(here)]
+            for kept_to, of in ((found, rows), (limits, given)):
+                kept_to += [(e, text) for e, text in of if e.free_symbols and e.free_symbols <= known]
+            at = [(sp.sympify(sp.sympify(e).xreplace(self.values)), text) for e, text in (*given, here.effect())]
+            for e, sentence in (*rows, *at):
                 if e.is_number and e < 0:
                     raise SystemDefinitionError(sentence)
-        return found
+        return found, limits
 
     def condition(self, rows: Sequence[Condition], owner: str) -> str:
         """The text of a condition; its expressions become indicators, equal ones of an element the same."""

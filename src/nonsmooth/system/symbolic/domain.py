@@ -189,9 +189,13 @@ class Domain:
     traced : Traced
     apart : iterable of (expression, message), optional
         Further expressions of the parameters that must not be negative.
+    limits : iterable of (expression, message), optional
+        Those that a fit may try.
     """
 
-    def __init__(self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = ()) -> None:
+    def __init__(
+        self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = (), limits: Iterable[tuple[sp.Expr, str]] = ()
+    ) -> None:
         self._names = traced.parameter_names
         self._zero: dict[str, str] = {}  # parameter -> what divides by it
         self._rules: list[_Rule] = []
@@ -215,8 +219,9 @@ class Domain:
             self._rules.append(_Rule(traced.period, "period", "", traced))
         self._rules += [_Rule(phase, "phase", owner, traced) for owner, phase in phases.items()]
         self._rules += [_Rule(expression, "apart", message, traced) for expression, message in apart]
+        self._limits = [_Rule(expression, "apart", message, traced) for expression, message in limits]
 
-    def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None) -> None:
+    def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None, *, tried: bool = False) -> None:
         """Raise SystemDefinitionError where ``values`` are not allowed.
 
         Parameters
@@ -224,11 +229,13 @@ class Domain:
         values : mapping of name to float
         changed : iterable of str, optional
             Only what depends on these has to be looked at.
+        tried : bool
+            By a fit: limits of what is given are none of what it comes by.
         """
         for name in values if changed is None else changed:
             if name in self._zero and values[name] == 0:
                 raise SystemDefinitionError(self._by_zero(name))
-        for rule in self._rules:
+        for rule in self._rules if tried else (*self._rules, *self._limits):
             if changed is None or not rule.used.isdisjoint(changed):
                 rule.check(values)
 
@@ -243,7 +250,7 @@ class Domain:
         for name in self._zero:
             if (points[:, self._names.index(name)] == 0).any():
                 raise SystemDefinitionError(self._by_zero(name))
-        for rule in self._rules:
+        for rule in (*self._rules, *self._limits):
             with np.errstate(all="ignore"):
                 refused = ~np.broadcast_to(rule.allows(rule.of_rows(*points.T)), len(points))
             if refused.any():
