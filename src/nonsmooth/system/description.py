@@ -31,7 +31,7 @@ from nonsmooth.system.symbolic.scalar import to_expression
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 from nonsmooth.system.symmetry import Symmetry, trace_symmetry
-from nonsmooth.system.transition import Band, Mode, Surface, Transition
+from nonsmooth.system.transition import Band, Mode, Surface
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.loads import Loads
@@ -115,47 +115,30 @@ class Description:
     @property
     def symbol_names(self) -> dict[sp.Symbol, str]:
         """Names of the symbols in text: ``t``, ``u.x``, ``p.k`` (memory is read as ``p.`` too)."""
-        t = self.traced
-        names = {t.t: "t"}
-        names |= {s: f"u.{name}" for s, name in zip(t.u, t.state_names, strict=True)}
-        names |= {s: f"p.{name}" for s, name in zip(t.p, t.parameter_names, strict=True)}
-        return names | {s: f"p.{name}" for s, name in zip(t.m, t.memory_names, strict=True)}
+        return self.traced.named("u.", "p.")
 
 
-def describe(
-    *,
-    name: str,
-    states: Mapping[str, str] | Sequence[str],
-    parameters: Mapping[str, Any],
-    modes: Mapping[str, Callable[..., Any] | Mode],
-    indicators: Mapping[str, Callable[..., Any]] | None,
-    transitions: Sequence[Transition | Surface],
-    memory: Mapping[str, Any] | None,
-    outputs: Mapping[str, Any] | None,
-    symmetry: Any,
-    scale: Mapping[str, float] | None,
-    period: Any,
-    bands: Mapping[str, Band] | None,
-    elements: Any = None,
-    impacts: str = "simultaneous",
-    inputs: Mapping[str, Any] | Sequence[str] | None = None,
-    written: bool = False,
-) -> Description:
-    """Check everything, call each function once with symbols, and return the description.
+def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
+    """Check all arguments of a system, call each function once with symbols, and return the description.
 
     Elements that decide together are ``written`` out as modes where that is asked for, or has to be.
     """
-    asked = dict(locals())
-    given = asked | {"states": _units(states, "states", name), "indicators": indicators or {}, "outputs": outputs or {}}
-    given["inputs"] = read_inputs(_units(inputs or {}, "inputs", name, raw=True), name)
+    name = asked["name"]
+    given = {**asked, "written": written, "states": _units(asked["states"], "states", name)}
+    given |= {key: asked[key] or {} for key in ("indicators", "outputs", "bands")}
+    given["inputs"] = read_inputs(_units(asked["inputs"] or {}, "inputs", name, raw=True), name)
     _check_kinds(given)
+    given["modes"] = {key: mode if isinstance(mode, Mode) else Mode(mode) for key, mode in given["modes"].items()}
+    given["outputs"] = {key: _output(key, one) for key, one in given["outputs"].items()}
     own = given["states"]
     driven = [key for states in input_states(given["inputs"]).values() for key in states]
     if driven:
         check_names({"state": own, "input": driven}, name)
         given |= with_inputs(given)
-    known = {key: Parameter.read(key, one) for key, one in parameters.items()}
-    remembered = {key: _memory(key, one) for key, one in _units(memory or {}, "memory", name, raw=True).items()}
+    known = {key: Parameter.read(key, one) for key, one in given["parameters"].items()}
+    remembered = {
+        key: _memory(key, one) for key, one in _units(asked["memory"] or {}, "memory", name, raw=True).items()
+    }
     symbols = Symbols(
         name,
         given["states"],
@@ -164,15 +147,13 @@ def describe(
         tuple(driven),
     )
     values = {symbol: known[key].value for key, symbol in symbols.p.items()}
-    given |= {"scale": _scale(scale, given["states"], name)}
+    given |= {"scale": _scale(given["scale"], given["states"], name)}
     made = _with_elements(symbols, given, values)
     given = given | made  # `plain` goes on with what was given
-    shown = {key: _output(key, one) for key, one in given["outputs"].items()}
-    bands = dict(bands or {})
+    shown, bands, symmetry = given["outputs"], given["bands"], given["symmetry"]
     for key, band in bands.items():
         if not isinstance(band, Band):
             raise SystemDefinitionError(f"{name!r}: the band of {key!r} must be an ns.Band, not {band!r}")
-    slid = [(item, sliding_mode(item, given["transitions"])) for item in _surfaces(given["transitions"])]
     check_names(
         {
             "state": own,
@@ -183,13 +164,13 @@ def describe(
             "indicator": given["indicators"],
             "output": shown,
             "memory of a band": sorted({key for band in bands.values() for key in (band.write or {})}),
-            "sliding mode": [mode for _, mode in slid],
+            "sliding mode": [mode for _, mode in _slid(given["transitions"])],
         },
         name,
     )
-    traced, surfaces = _traced(symbols, given, shown)
+    traced, surfaces = _traced(symbols, given)
     _check_phases(traced)
-    traced, explicit = _with_period(traced, symbols, values, period)
+    traced, explicit = _with_period(traced, symbols, values, given["period"])
     if symmetry is not None:
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
     if "patterns" in made:
@@ -198,7 +179,7 @@ def describe(
         traced = made["decider"].decides(traced, made["kinds"], made["asked"])
     units_out = {key: unit for key, (_, unit) in shown.items()}
     loads = None
-    if elements:
+    if given["elements"]:
         from nonsmooth.system.derived.loads import loads_of
 
         loads = loads_of(made["make"])
@@ -220,7 +201,7 @@ def describe(
         relays=made.get("relays", False),
         loads=loads,
         inputs=given["inputs"],
-        written=partial(describe, **{**asked, "written": True}) if made.get("also written") else None,
+        written=partial(describe, asked, written=True) if made.get("also written") else None,
     )
     return description if loads is None else description.with_loads(loads)
 
@@ -257,21 +238,18 @@ def _with_elements(symbols: Symbols, given: Mapping[str, Any], values: Mapping[s
     return made | {"ranges": ranges, "relays": relays is not None, "plain": partial(_traced, symbols, given)}
 
 
-def _traced(
-    symbols: Symbols, given: Mapping[str, Any], shown: Mapping[str, Any] | None = None
-) -> tuple[Traced, tuple[TracedSurface, ...]]:
+def _traced(symbols: Symbols, given: Mapping[str, Any]) -> tuple[Traced, tuple[TracedSurface, ...]]:
     """The equations as they are given, elements put aside, and their surfaces."""
-    shown = {key: _output(key, one) for key, one in given["outputs"].items()} if shown is None else shown
     kinds = {key: _mode(mode, key, given["states"]) for key, mode in given["modes"].items()}
     transitions = given["transitions"]
-    traced = trace_system(given["name"], symbols, kinds, dict(given["indicators"]), transitions, shown)
-    slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
-    return traced, tuple(trace_surface(item, mode, traced, symbols) for item, mode in slid)
+    traced = trace_system(given["name"], symbols, kinds, dict(given["indicators"]), transitions, given["outputs"])
+    return traced, tuple(trace_surface(item, mode, traced, symbols) for item, mode in _slid(transitions))
 
 
-def _surfaces(transitions: Any) -> list[Surface]:
-    """The surfaces among what may yet turn out to be no list."""
-    return [item for item in transitions if isinstance(item, Surface)] if isinstance(transitions, Iterable) else []
+def _slid(transitions: Any) -> list[tuple[Surface, str]]:
+    """The surfaces among what may yet turn out to be no list, each with the name of its sliding mode."""
+    some = transitions if isinstance(transitions, Iterable) else ()
+    return [(item, sliding_mode(item, some)) for item in some if isinstance(item, Surface)]
 
 
 def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, Any]:
@@ -310,8 +288,7 @@ def _output(key: str, given: Any) -> tuple[Any, str]:
     return function, unit
 
 
-def _mode(given: Any, key: str, states: Mapping[str, str]) -> tuple[Callable[..., Any], tuple[str, ...]]:
-    mode = given if isinstance(given, Mode) else Mode(given)
+def _mode(mode: Mode, key: str, states: Mapping[str, str]) -> tuple[Callable[..., Any], tuple[str, ...]]:
     own = tuple(states) if mode.states is None else tuple(mode.states)
     for name in own:
         if name not in states:

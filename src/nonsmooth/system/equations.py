@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,12 +56,8 @@ def trace_system(
     everything = tuple(symbols.u)
     fields, lacking = [], []
     for key, (function, own) in modes.items():
-        what = f"the vector field of mode {key!r}"
-        part = call_vector(function, (time, symbols.states(own, f"mode {key!r}"), p), own, what)
-        for entry in part:
-            refuse_corners(entry, moving, what)
-        whole = dict(zip(own, part, strict=True))
-        fields.append(tuple(whole.get(state, sp.Integer(0)) for state in everything))
+        arguments = time, symbols.states(own, f"mode {key!r}"), p
+        fields.append(_states(function, arguments, own, f"the vector field of mode {key!r}", everything, moving))
         lacking.append(tuple(state not in own for state in everything))
     surfaces_of = []
     for key, function in indicators.items():
@@ -112,6 +108,22 @@ def trace_system(
     )
 
 
+def _states(
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
+    own: tuple[str, ...],
+    what: str,
+    every: Iterable[str],
+    moving: set[sp.Symbol],
+) -> tuple[sp.Expr, ...]:
+    """One expression for every state, 0 for those that a function has not among its ``own``; none has a corner in what
+    is ``moving``."""
+    whole = dict(zip(own, call_vector(function, arguments, own, what), strict=True))
+    for entry in whole.values():
+        refuse_corners(entry, moving, what)
+    return tuple(whole.get(state, sp.Integer(0)) for state in every)
+
+
 def _mode_index(name: str, label: str, modes: Mapping[str, Any]) -> int:
     if name not in modes:
         raise SystemDefinitionError(f"transition {label}: {unknown(name, 'a mode', 'this system', list(modes))}")
@@ -128,18 +140,14 @@ def _surface_jumps(
         )
     if set(modes[item.below]) != set(modes[item.above]):
         raise SystemDefinitionError(f"{item.label}: both modes must have the same states")
-    i = list(indicators).index(item.indicator)
+    i, names = list(indicators).index(item.indicator), list(modes)
     return [
-        TracedTransition(
-            below, above, (TracedCondition(i, 1),), contact=below == 0, label=f"{item.below} -> {item.above}"
-        ),
-        TracedTransition(
-            above, below, (TracedCondition(i, -1),), contact=above == 0, label=f"{item.above} -> {item.below}"
-        ),
+        TracedTransition(a, b, (TracedCondition(i, sign),), contact=a == 0, label=f"{names[a]} -> {names[b]}")
+        for a, b, sign in ((below, above, 1), (above, below, -1))
     ]
 
 
-def sliding_mode(item: Surface, transitions: Sequence[Transition | Surface]) -> str:
+def sliding_mode(item: Surface, transitions: Iterable[Transition | Surface]) -> str:
     """Name of the mode in which motion slides along a surface."""
     alike = [one for one in transitions if isinstance(one, Surface) and one.indicator == item.indicator]
     default = f"{item.indicator}_sliding" + (f"_{item.below}_{item.above}" if len(alike) > 1 else "")
@@ -159,11 +167,7 @@ def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) ->
     elif static is not None:
         static = to_expression(static)
     if item.field is not None:
-        part = call_vector(item.field, arguments, own, f"the field of {item.label}")
-        for entry in part:
-            refuse_corners(entry, moving, f"the field of {item.label}")
-        whole = dict(zip(own, part, strict=True))
-        field = tuple(whole.get(state, sp.Integer(0)) for state in traced.state_names)
+        field = _states(item.field, arguments, own, f"the field of {item.label}", traced.state_names, moving)
     i = traced.indicator_names.index(item.indicator)
     return TracedSurface(i, below, modes.index(item.above), mode, static, field)
 
@@ -193,9 +197,7 @@ def _jump(
     u, p = symbols.states(before, f"mode {item.source!r}"), symbols.parameters()
     reset = None
     if item.reset is not None:
-        part = call_vector(item.reset, (time, u, p), after, f"the reset of {label}")
-        whole = dict(zip(after, part, strict=True))
-        reset = tuple(whole.get(state, sp.Integer(0)) for state in symbols.u)
+        reset = _states(item.reset, (time, u, p), after, f"the reset of {label}", symbols.u, set())
     elif not set(after) <= set(before):
         new = [state for state in after if state not in before]
         raise SystemDefinitionError(

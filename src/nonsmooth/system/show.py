@@ -16,17 +16,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 
-def _plain(traced: Traced) -> dict[sp.Symbol, str]:
-    names = {traced.t: "t"}
-    for symbols, known in (
-        (traced.u, traced.state_names),
-        (traced.p, traced.parameter_names),
-        (traced.m, traced.memory_names),
-    ):
-        names |= dict(zip(symbols, known, strict=True))
-    return names
-
-
 def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -> str:
     text = jump.label
     if jump.at is not None:
@@ -65,7 +54,7 @@ def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
     """Headings and texts: states, parameters, equations by mode, indicators, transitions, period."""
     patterns, loads = system.traced.patterns, system._description.loads
     traced = system.traced if patterns is None else patterns.plain
-    names = _plain(traced)
+    names = traced.named()
     lines: list[tuple[str, str]] = []
     short = loads is not None and bool(loads.elements) and not system.is_smoothed and not verbose
 
@@ -130,10 +119,8 @@ def latex(system: System) -> str:
     """Return the equations as an ``align*`` environment: fields by mode, indicators, transitions."""
     system.refuse_patterns("to_latex")
     traced, parameters = system.traced, system.parameters
-    names = {traced.t: "t"}
-    names |= {s: latex_name(name) for s, name in zip(traced.u, traced.state_names, strict=True)}
-    names |= {s: parameters[name].symbol for s, name in zip(traced.p, traced.parameter_names, strict=True)}
-    names |= {s: latex_name(name) for s, name in zip(traced.m, traced.memory_names, strict=True)}
+    names = {symbol: latex_name(name) for symbol, name in traced.named().items()}
+    names |= dict(zip(traced.p, (one.symbol for one in parameters.values()), strict=True))
 
     def write(expression: sp.Expr) -> str:
         return str(sp.latex(expression, symbol_names=names))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -23,8 +24,6 @@ from nonsmooth.system.variant import (
     SHARP,
     Derivatives,
     Variant,
-    changed_values,
-    parameter_rows,
     smoothed_values,
     variant_of,
 )
@@ -133,23 +132,7 @@ class System(Answering):
         inputs: Mapping[str, str | tuple[str, str]] | Sequence[str] | None = None,
         name: str = "system",
     ) -> None:
-        description = describe(
-            name=name,
-            states=states,
-            parameters=parameters,
-            modes=modes,
-            indicators=indicators,
-            transitions=transitions,
-            memory=memory,
-            outputs=outputs,
-            symmetry=symmetry,
-            scale=scale,
-            period=period,
-            bands=bands,
-            elements=elements,
-            impacts=impacts,
-            inputs=inputs,
-        )
+        description = describe({key: one for key, one in locals().items() if key != "self"})
         values = {key: parameter.value for key, parameter in description.parameters.items()}
         self._set(description, values, variant_of(description, SHARP))
         self._variant.domain.check(values)
@@ -185,8 +168,8 @@ class System(Answering):
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Parameters with present value, unit and symbol; a smoothed system has ``eta`` at the end."""
-        units, symbols = self._variant.units, self._variant.symbols
-        return MappingProxyType({key: Parameter(now, units[key], symbols[key]) for key, now in self.values.items()})
+        known = self._variant.parameters
+        return MappingProxyType({key: replace(known[key], value=now) for key, now in self.values.items()})
 
     @property
     def modes(self) -> tuple[str, ...]:
@@ -234,7 +217,7 @@ class System(Answering):
 
     def refuse_patterns(self, verb: str) -> None:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
-        self._variant.refuse_patterns(self.name, verb)
+        self._variant.refuse_patterns(verb)
 
     # Numbers
 
@@ -266,7 +249,7 @@ class System(Answering):
         ValueError, SystemDefinitionError
             An unknown name, a value that is not finite, or one the equations do not allow.
         """
-        return parameter_rows(self._variant, self.values, self.name, columns)
+        return self._variant.rows(self.values, columns)
 
     # Copies
 
@@ -288,8 +271,7 @@ class System(Answering):
         SystemDefinitionError
             A value the equations do not allow, such as a mass of zero.
         """
-        new = changed_values(self._variant, self.values, self.name, given, values)
-        return self._make(self._description, new, self._variant)
+        return self._make(self._description, self._variant.changed(self.values, given, values), self._variant)
 
     def written_out(self) -> Self:
         """Return the same system with all its modes, indicators and transitions as expressions.

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -19,12 +19,9 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.description import Description
 from nonsmooth.system.kinds import real_number
+from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.domain import Domain
-from nonsmooth.system.symbolic.traced import Traced
-
-if TYPE_CHECKING:
-    from nonsmooth.system.symbolic.traced import Traced
-
+from nonsmooth.system.symbolic.traced import Traced, along
 
 SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
 
@@ -46,14 +43,9 @@ class Variant:
             smoothed = smooth(description, kind == ONE_ETA, band or "linear")
             self.traced, self.etas, extra = smoothed.traced, smoothed.etas, smoothed.apart
             self.memory |= {name: (0.0, unit) for name, unit in smoothed.memory}
-        self.units: Mapping[str, str] = {
-            **{name: parameter.unit for name, parameter in description.parameters.items()},
-            **{name: "" for name, _ in self.etas},
-        }
-        self.symbols: Mapping[str, str] = {
-            **{name: parameter.symbol for name, parameter in description.parameters.items()},
-            **{name: r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}" for name, of in self.etas},
-        }
+        self.name, self.parameters = description.name, dict(description.parameters)
+        for name, of in self.etas:
+            self.parameters[name] = Parameter(0.0, "", r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}")
         self.domain = Domain(self.traced, (*description.ranges, *extra))
         tables = {
             "states": description.states,
@@ -64,7 +56,7 @@ class Variant:
         }
         #: What a system is, whatever the values of its parameters.
         self.facts: dict[str, Any] = {name: MappingProxyType(dict(one)) for name, one in tables.items()} | {
-            "name": description.name,
+            "name": self.name,
             "surfaces": description.surfaces if kind == SHARP else (),
             "symmetry": description.symmetry,
             "explicit_time": description.explicit_time,
@@ -84,8 +76,6 @@ class Variant:
         """The forcing period as a function of all parameters in order."""
         if self.traced.period is None:
             return None
-        import sympy as sp
-
         return sp.lambdify(self.traced.p, self.traced.period, modules="math")
 
     def period_at(
@@ -106,13 +96,62 @@ class Variant:
             return values["eta"]
         return {str(indicator): values[key] for key, indicator in self.etas}
 
-    def refuse_patterns(self, name: str, verb: str) -> None:
+    def refuse_patterns(self, verb: str) -> None:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
         if self.traced.patterns is not None:
             raise SystemDefinitionError(
-                f"{name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it. Not so "
-                f"for {verb}: take fewer elements for it"
+                f"{self.name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it. "
+                f"Not so for {verb}: take fewer elements for it"
             )
+
+    def changed(self, values: Mapping[str, float], given: Any, named: Mapping[str, float]) -> dict[str, float]:
+        """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it."""
+        changes = dict(named)
+        if given is not None:
+            mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
+            if not isinstance(mapping, Mapping):
+                raise TypeError(
+                    f"with_parameters takes a mapping or an object with a mapping `values`, not {shortened(given)}"
+                )
+            changes = {**mapping, **changes}
+        new = dict(values)
+        for key, value in changes.items():
+            self._check_known(key)
+            if type(value) is not float or value - value != 0:
+                value = real_number(value, f"parameter {key!r}")
+            new[key] = value
+        for key, _ in self.etas:
+            if key in changes:
+                _positive(new[key], key)
+        self.domain.check(new, changes)
+        return new
+
+    def rows(self, values: Mapping[str, float], columns: Mapping[str, Any]) -> np.ndarray:
+        """Rows of values (P, n_parameters) in declared order, for columns of equal length P."""
+        lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
+        sizes = {column.shape for column in lists.values()}
+        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
+            raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
+        now = np.array(list(values.values()), dtype=np.float64)
+        points = np.tile(now, (next(iter(sizes))[0] if sizes else 1, 1))
+        order = list(values)
+        for key, column in lists.items():
+            self._check_known(key)
+            if not np.isfinite(column).all():
+                raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
+            if key in dict(self.etas):
+                _positive(float(column.min()), key)
+            points[:, order.index(key)] = column
+        if len(points):
+            self.domain.check_points(points)
+        return points
+
+    def _check_known(self, key: str) -> None:
+        """ValueError for what is no parameter."""
+        if key not in self.parameters:
+            units = {name: parameter.unit for name, parameter in self.parameters.items()}
+            hint = "; eta is set by smoothed(eta)" if str(key).startswith("eta") and self.kind == SHARP else ""
+            raise ValueError(unknown(key, "a parameter", repr(self.name), units) + hint)
 
     @cached_property
     def derivatives(self) -> Derivatives:
@@ -216,57 +255,8 @@ class Derivatives:
             raise ValueError(f"the order of a Lie derivative is not negative, {order}")
         if order == 0:
             return self.traced.indicators[indicator]
-        before, t = self.lie(indicator, mode, order - 1), self.traced
-        flow = sum(before.diff(u) * f for u, f in zip(t.u, t.fields[mode], strict=True))
-        return sp.expand(before.diff(t.t) + flow)
-
-
-def changed_values(
-    variant: Variant, values: Mapping[str, float], name: str, given: Any, named: Mapping[str, float]
-) -> dict[str, float]:
-    """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it."""
-    changes = dict(named)
-    if given is not None:
-        mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
-        if not isinstance(mapping, Mapping):
-            raise TypeError(
-                f"with_parameters takes a mapping or an object with a mapping `values`, not {shortened(given)}"
-            )
-        changes = {**mapping, **changes}
-    new = dict(values)
-    for key, value in changes.items():
-        if key not in new:
-            raise ValueError(_unknown_parameter(key, variant, name))
-        if type(value) is not float or value - value != 0:
-            value = real_number(value, f"parameter {key!r}")
-        new[key] = value
-    for key, _ in variant.etas:
-        if key in changes:
-            _positive(new[key], key)
-    variant.domain.check(new, changes)
-    return new
-
-
-def parameter_rows(variant: Variant, values: Mapping[str, float], name: str, columns: Mapping[str, Any]) -> np.ndarray:
-    """Rows of values (P, n_parameters) in declared order, for columns of equal length P."""
-    lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
-    sizes = {column.shape for column in lists.values()}
-    if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
-        raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
-    now = np.array(list(values.values()), dtype=np.float64)
-    points = np.tile(now, (next(iter(sizes))[0] if sizes else 1, 1))
-    order = list(values)
-    for key, column in lists.items():
-        if key not in values:
-            raise ValueError(_unknown_parameter(key, variant, name))
-        if not np.isfinite(column).all():
-            raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
-        if key in dict(variant.etas):
-            _positive(float(column.min()), key)
-        points[:, order.index(key)] = column
-    if len(points):
-        variant.domain.check_points(points)
-    return points
+        t = self.traced
+        return sp.expand(along(self.lie(indicator, mode, order - 1), t.t, t.u, t.fields[mode]))
 
 
 def smoothed_values(
@@ -295,13 +285,6 @@ def smoothed_values(
     new = plain | {key: _positive(real_number(width, key), key) for key, width in widths.items()}
     variant.domain.check(new)
     return new, variant
-
-
-def _unknown_parameter(key: object, variant: Variant, name: str) -> str:
-    text = unknown(key, "a parameter", repr(name), variant.units)
-    if str(key).startswith("eta") and variant.kind == SHARP:
-        text += "; eta is set by smoothed(eta)"
-    return text
 
 
 def _positive(width: float, key: str) -> float:

@@ -73,16 +73,11 @@ def assembled(
     """
     parts, modes = element_names(given["elements"]), given["modes"]
     for key, mode in modes.items():
-        if isinstance(mode, Mode) and set(mode.states or symbols.u) != set(symbols.u):
+        if set(mode.states or symbols.u) != set(symbols.u):
             raise SystemDefinitionError(f"mode {key!r}: a system with elements has all its states in every mode")
     arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
     base = {
-        key: call_vector(
-            mode.field if isinstance(mode, Mode) else mode,
-            arguments,
-            tuple(symbols.u),
-            f"the vector field of mode {key!r}",
-        )
+        key: call_vector(mode.field, arguments, tuple(symbols.u), f"the vector field of mode {key!r}")
         for key, mode in modes.items()
     }
     resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
@@ -123,7 +118,7 @@ def _written_out(
         words = [f"{part.name}_{part.element.phases[k]}" for part, k in zip(make.parts, pattern, strict=True)]
         return "_".join(words if len(base) == 1 else [mode, *words])
 
-    fields: dict[str, Any] = {}
+    fields: dict[str, Mode] = {}
     forces: dict[str, dict[str, Any]] = {part.name: {} for part in make.parts}
     transitions: list[Transition | Surface] = []
     kinds: list[str] = []  # of the transitions
@@ -131,7 +126,7 @@ def _written_out(
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
-        fields[here] = KnownFunction(f)
+        fields[here] = Mode(KnownFunction(f))
         for k, part in enumerate(make.parts):
             forces[part.name][here] = KnownFunction(found[k])
         for k, part in enumerate(make.parts):
@@ -166,8 +161,7 @@ def _written_out(
                 transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write, contact))
                 kinds.append(OWN if item.reset is None else ASKS_BEHIND)
     outputs = {}
-    for key, output in given["outputs"].items():
-        function, unit = output if isinstance(output, (tuple, list)) else (output, "")
+    for key, (function, unit) in given["outputs"].items():
         if isinstance(function, Mapping):
             function = {name(mode, pattern): function[mode] for mode, pattern in pairs}
         outputs[key] = function, unit
@@ -239,7 +233,7 @@ def _opened(
     patterns = patterns or Patterns(make, next(iter(base)))
     patterns.why = why
     return {
-        "modes": {key: KnownFunction(list(field)) for key, field in base.items()},
+        "modes": {key: Mode(KnownFunction(list(field))) for key, field in base.items()},
         "transitions": (),
         "indicators": {key: KnownFunction(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
         "outputs": given["outputs"],

@@ -17,6 +17,7 @@ from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.derived.faces import INDEPENDENT
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
+from nonsmooth.system.symbolic.traced import along
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 
 OTHER = 8  # draws from here on have other parameters too
@@ -99,10 +100,7 @@ class Expressions(Assembler):
         return list(self.u)
 
     def along(self, expression: sp.Expr, field: Sequence[sp.Expr]) -> sp.Expr:
-        total = sp.diff(expression, self.symbols.t)
-        for symbol, entry in zip(self.u, field, strict=True):
-            total += sp.diff(expression, symbol) * entry
-        return sp.expand(total)
+        return sp.expand(along(expression, self.symbols.t, self.u, field))
 
     def across(self, expression: sp.Expr, part: Part) -> sp.Expr:
         return sp.Add(*[sp.diff(expression, self.u[i]) * d for i, d in part.direction.items()])

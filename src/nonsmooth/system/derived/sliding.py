@@ -38,7 +38,7 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.derived.sticking import Additions
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.symbolic.scalar import as_written
-from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Traced, TracedCondition, TracedTransition
+from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Traced, TracedCondition, TracedTransition, along
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -138,9 +138,7 @@ class _SlidingModes(Additions):
 
     def rate(self, pair: _Pair, mode: int) -> sp.Expr:
         """Lie derivative of the pair's indicator in a mode."""
-        h = self.indicators[pair.indicator]
-        flow = sum(h.diff(u) * f for u, f in zip(self.traced.u, self.fields[mode], strict=True))
-        return sp.expand(h.diff(self.traced.t) + flow)
+        return sp.expand(along(self.indicators[pair.indicator], self.traced.t, self.traced.u, self.fields[mode]))
 
     def at_surface(self, pair: _Pair, expression: sp.Expr) -> sp.Expr:
         """The expression without a state that the surface determines: a field may have no value far beyond it."""
@@ -193,11 +191,11 @@ class _SlidingModes(Additions):
             if pair.field is not None:
                 field = self._given(pair, pair.field)
             found.setdefault(key, []).append((pair, field, shown))
-        for (cell, along), ways in found.items():
+        for (cell, held), ways in found.items():
             first, field, shown = ways[0]
             if not all(_agree(field, other) for _, other, _ in ways[1:]):
                 continue
-            name = first.mode or "_".join(self.indicator_names[i] for i in sorted(along)) + "_sliding"
+            name = first.mode or "_".join(self.indicator_names[i] for i in sorted(held)) + "_sliding"
             if name in self.modes:
                 name += "".join(f"_{self.modes[mode]}" for mode in sorted(cell))
             self.sliding |= {pair: len(self.modes) for pair, _, _ in ways}
@@ -205,7 +203,7 @@ class _SlidingModes(Additions):
             self.fields.append(field)
             self.lacking.append(self.lacking[first.below])
             self.cells.append(cell)
-            self.along.append(along)
+            self.along.append(held)
             for row, entry in zip(self.outputs, shown, strict=True):
                 row.append(entry)
 
@@ -221,7 +219,7 @@ class _SlidingModes(Additions):
             return field, [x if x == y else x + b * (y - x) for x, y in ends]
         e, slope, length = found
         field = tuple(
-            x if along == 0 else sp.expand(x - along * (below + off) / slope) for x, along in zip(first, e, strict=True)
+            x if way == 0 else sp.expand(x - way * (below + off) / slope) for x, way in zip(first, e, strict=True)
         )
         shown = [x if x == y else sp.expand(x - self.ratio(y - x, length) * below / slope) for x, y in ends]
         return field, shown
@@ -230,7 +228,7 @@ class _SlidingModes(Additions):
         """The field that was given for the surface, with the same decay beside it."""
         h = self.indicators[pair.indicator]
         slopes = [h.diff(u) for u in self.traced.u]
-        rate = sp.expand(h.diff(self.traced.t) + sum(s * f for s, f in zip(slopes, given, strict=True)))
+        rate = sp.expand(along(h, self.traced.t, self.traced.u, given))
         remainder = sp.simplify(self.at_surface(pair, rate))
         if remainder != 0 and sp.fraction(sp.cancel(rate / h))[1].free_symbols & self.moving:
             raise SystemDefinitionError(

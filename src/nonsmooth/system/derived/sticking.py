@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.symbolic.traced import ALONE, Traced, TracedCondition, TracedTransition
+from nonsmooth.system.symbolic.traced import ALONE, Traced, TracedCondition, TracedTransition, along
 
 LEVEL = 1e-9  # of 1: by how much a static friction may differ from the kinetic one, given as another number
 
@@ -71,10 +71,7 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
         f"{traced.name!r} cannot be smoothed between {names[ends[1]]!r} and {names[ends[-1]]!r}: the friction that "
         f"holds in {names[mode]!r} is not the kinetic one, and a band has no other; make them equal"
     )
-    rates = {
-        sp.expand(sum(surface.diff(u) * f for u, f in zip(traced.u, traced.fields[end], strict=True)))
-        for end in ends.values()
-    }
+    rates = {sp.expand(along(surface, traced.t, traced.u, traced.fields[end])) for end in ends.values()}
     if len(rates) == 1:  # a place, whose rate no force changes at once: a preloaded spring
         return []
     found = []
@@ -82,8 +79,7 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
         if jump.source != mode or jump.target not in ends.values() or len(jump.rows) != 1:
             continue
         end = traced.indicators[jump.rows[0].indicator]
-        field = traced.fields[jump.target]
-        rate = surface.diff(traced.t) + sum(surface.diff(u) * f for u, f in zip(traced.u, field, strict=True))
+        rate = along(surface, traced.t, traced.u, traced.fields[jump.target])
         rate, end = (sp.expand(e.subs(symbol, at)) for e in (rate, end))
         shared = sorted(rate.free_symbols & end.free_symbols, key=lambda s: (s not in moving, str(s)))
         if not shared:

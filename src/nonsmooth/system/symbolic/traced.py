@@ -6,6 +6,7 @@ derivatives, the code generator, the smoothed switch and the text form.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,11 @@ ALONE, ASKED, TOGETHER, FOUND = "alone", "asked", "together", "found"  # kinds o
 ENDS = ("not_unique", "no_motion")  # of a question without an answer, in the order of their statuses' codes
 OWN, ASKS_BEHIND = "own", "asks behind"  # of the system's own beside elements that are asked
 NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion has no unique way on
+
+
+def along(expression: Expr, t: Symbol, u: Iterable[Symbol], field: Iterable[Expr]) -> Expr:
+    """The derivative in time of an expression along a vector field: h_t + h_u f."""
+    return expression.diff(t) + sum(expression.diff(symbol) * entry for symbol, entry in zip(u, field, strict=True))
 
 
 @dataclass(frozen=True)
@@ -146,6 +152,14 @@ class Traced:
                 kept.append(jump)
         return replace(self, transitions=tuple(kept)), tuple(stands)
 
+    def named(self, u: str = "", p: str = "") -> dict[Symbol, str]:
+        """Names of the symbols in text; those of states begin with ``u``, those of parameters and memory with ``p``."""
+        names = (
+            *(u + name for name in self.state_names),
+            *(p + n for n in (*self.parameter_names, *self.memory_names)),
+        )
+        return {self.t: "t", **dict(zip((*self.u, *self.p, *self.m), names, strict=True))}
+
     def keeps_at_zero(self, mode: int, indicator: int) -> bool:
         """Return whether motion in a mode slides along the surface of an indicator."""
         return mode < len(self.along) and indicator in self.along[mode]
@@ -162,7 +176,7 @@ class Traced:
         from nonsmooth.system.symbolic.expressions import write_expression
 
         assert jump.at is not None
-        return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))
+        return write_expression(jump.at, self.named())
 
     def ends(self, jump: TracedTransition) -> bool:
         """Return whether motion is not unique behind a transition, so that a run ends there."""
