@@ -64,7 +64,6 @@ class Description:
     plain: Callable[[], tuple[Traced, tuple[TracedSurface, ...]]] | None = field(
         default=None, compare=False, repr=False
     )  # without elements
-    relays: bool = False  # the elements are the surfaces that were given
     loads: Loads | None = None  # of a system with elements
     inputs: Mapping[str, Any] = field(default_factory=dict)  # the unit of each, with "smooth" where it is so
     written: Callable[[], Description] | None = field(default=None, compare=False, repr=False)
@@ -82,11 +81,10 @@ class Description:
 
     def written_out(self) -> Description:
         """The description with a mode for each combination of its elements' phases, made once."""
-        if self.written is None:
+        if self.written is None or self.loads is None:
             return self
         if "written out" not in self.variants:
-            found = self.written()
-            self.variants["written out"] = found if self.loads is None else found.with_loads(self.loads)
+            self.variants["written out"] = replace(self.written().with_loads(self.loads), ranges=self.ranges)
         written: Description = self.variants["written out"]
         return written
 
@@ -95,13 +93,14 @@ class Description:
         forces = {f"{name}_force": units[0] for name, units in loads.units(self.symbol_units).items()}
         return replace(self, loads=loads, outputs={**self.outputs, **forces})
 
-    def with_sliding(self, traced: Traced) -> Traced:
-        """Return the declared equations, or what they became, with their sliding modes."""
-        if not self.surfaces:
-            return traced
-        from nonsmooth.system.derived.sliding import slide
+    def refined(self, powers: Mapping[str, sp.Expr], energy: str, ranges: Sequence[tuple[sp.Expr, str]]) -> Description:
+        """Return the description with the powers of a mechanical system and the unit of their work, and with what must
+        not be negative."""
+        from nonsmooth.system.derived.loads import Loads
 
-        return slide(traced, self.surfaces, self.scale)
+        loads = self.loads or Loads((), dict(zip(self.traced.mode_names, self.traced.fields, strict=True)))
+        new = self.with_loads(replace(loads, powers=powers, energy=energy)) if powers else self
+        return replace(new, ranges=tuple(ranges), variants={}) if ranges else new
 
     @property
     def symbol_units(self) -> dict[sp.Symbol, str]:
@@ -198,7 +197,6 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
         explicit_time=explicit,
         ranges=tuple(made.get("ranges", ())),
         plain=made.get("plain"),
-        relays=made.get("relays", False),
         loads=loads,
         inputs=given["inputs"],
         written=partial(describe, asked, written=True) if made.get("also written") else None,
@@ -235,7 +233,7 @@ def _with_elements(symbols: Symbols, given: Mapping[str, Any], values: Mapping[s
     else:
         return {}
     ranges = [*(relays.ranges if relays else ()), *made["ranges"]]
-    return made | {"ranges": ranges, "relays": relays is not None, "plain": partial(_traced, symbols, given)}
+    return made | {"ranges": ranges, "plain": partial(_traced, symbols, given)}
 
 
 def _traced(symbols: Symbols, given: Mapping[str, Any]) -> tuple[Traced, tuple[TracedSurface, ...]]:

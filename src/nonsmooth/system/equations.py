@@ -20,8 +20,8 @@ from nonsmooth.system.transition import Band, Surface, Transition, read_conditio
 class TracedSurface:
     """A Filippov surface in integers: where ``indicator`` is negative the mode is ``below``.
 
-    ``mode`` names the sliding mode; ``static`` is the ratio of the static value to the kinetic one, ``field`` what is
-    given in place of Filippov's field (None: not given)."""
+    ``mode`` names the sliding mode ("": after its indicators); ``static`` is the ratio of the static value to the
+    kinetic one, ``field`` what is given in place of Filippov's field (None: not given)."""
 
     indicator: int
     below: int
@@ -89,13 +89,7 @@ def trace_system(
             )
     return Traced(
         name=name,
-        t=symbols.t,
-        u=tuple(symbols.u.values()),
-        p=tuple(symbols.p.values()),
-        m=tuple(symbols.m.values()),
-        state_names=everything,
-        parameter_names=tuple(symbols.p),
-        memory_names=tuple(symbols.m),
+        **symbols.of_traced(),
         mode_names=tuple(modes),
         indicator_names=tuple(indicators),
         output_names=tuple(outputs),

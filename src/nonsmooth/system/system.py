@@ -21,7 +21,6 @@ from nonsmooth.system.symmetry import Symmetry
 from nonsmooth.system.text import read_system, write_system
 from nonsmooth.system.transition import Band, Mode, Surface, Transition
 from nonsmooth.system.variant import (
-    SHARP,
     Derivatives,
     Variant,
     smoothed_values,
@@ -134,7 +133,7 @@ class System(Answering):
     ) -> None:
         description = describe({key: one for key, one in locals().items() if key != "self"})
         values = {key: parameter.value for key, parameter in description.parameters.items()}
-        self._set(description, values, variant_of(description, SHARP))
+        self._set(description, values, variant_of(description))
         self._variant.domain.check(values)
 
     def _set(self, description: Description, values: dict[str, float], variant: Variant) -> Self:
@@ -151,6 +150,10 @@ class System(Answering):
     @classmethod
     def _make(cls, description: Description, values: dict[str, float], variant: Variant) -> Self:
         return object.__new__(cls)._set(description, values, variant)
+
+    def _of(self, description: Description) -> Self:
+        """The same with another description, at the same values."""
+        return self._make(description, dict(self.values), variant_of(description))
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
@@ -281,9 +284,7 @@ class System(Answering):
         of them out by itself; here they are to be looked at. Many elements take seconds.
         """
         description = self._description.written_out()
-        if description is self._description:
-            return self
-        return self._make(description, dict(self.values), variant_of(description, SHARP))
+        return self if description is self._description else self._of(description)
 
     def as_solved_by(self, options: Mapping[str, Any]) -> Self:
         """Return the system as the options of a verb need it: written out for a series, a step or a ramp."""

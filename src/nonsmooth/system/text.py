@@ -7,8 +7,7 @@ checks as what a user writes, because it is handed to them as functions that ret
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
@@ -22,10 +21,9 @@ from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import Traced, TracedCondition
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols
 from nonsmooth.system.transition import Band, Mode, Surface, Transition, condition_text
-from nonsmooth.system.variant import variant_of
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.loads import Load, Loads
+    from nonsmooth.system.derived.loads import Load
     from nonsmooth.system.system import System
 
 _FORMAT = "nonsmooth system"
@@ -73,10 +71,11 @@ def _pieces(
 
 
 def _content(d: Description) -> dict[str, Any]:
-    elements = d.traced.patterns or d.traced.decider
-    t, surfaces, names = d.traced, d.surfaces, d.symbol_names
-    if t.decider is not None and d.plain is not None:
-        t, surfaces = d.plain()
+    """A system with elements as it was given: its equations without them, and the elements."""
+    from nonsmooth.system.derived.expressions import SPEED
+
+    t, surfaces = (d.traced, d.surfaces) if d.plain is None else d.plain()
+    names = {**d.symbol_names, SPEED: "speed"}
 
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
@@ -108,8 +107,6 @@ def _content(d: Description) -> dict[str, Any]:
     modes = {}
     for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
         modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
-    known = {} if elements is None or d.relays else elements.make.described()
-    indicators = {} if t.patterns is not None else dict(zip(t.indicator_names, map(text, t.indicators), strict=True))
     content: dict[str, Any] = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -119,7 +116,7 @@ def _content(d: Description) -> dict[str, Any]:
         "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
         "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
         "modes": modes,
-        "indicators": indicators,
+        "indicators": dict(zip(t.indicator_names, map(text, t.indicators), strict=True)),
         "transitions": transitions,
         "outputs": {
             k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
@@ -136,52 +133,28 @@ def _content(d: Description) -> dict[str, Any]:
             "shift": d.symmetry.shift,
             "modes": {d.traced.mode_names[i]: d.traced.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
         }
-    if elements is not None and elements.make.sequential:
+    if d.traced.patterns is not None and d.traced.patterns.make.sequential:
         content["impacts"] = "sequential"
-    if known:
-        from nonsmooth.system.derived.expressions import SPEED
-
-        names = {**names, SPEED: "speed"}
-        content["elements"] = {k: _element_content(one, text) for k, one in known.items()}
     if d.loads is not None:
-        content["loads"] = _loads_content(d.loads, d, text)
-    if d.ranges and not known:
+        content["elements"] = {one.name: _element_content(one, t.state_names, text) for one in d.loads.elements}
+        content["powers"] = {name: text(power) for name, power in d.loads.powers.items()}
+        content["energy"] = d.loads.energy
+    if d.ranges:
         content["ranges"] = [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges]
     if d.bands:
         content["bands"] = {d.traced.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
     return content
 
 
-def _element_content(element: Mapping[str, Any], text: Callable[[sp.Expr], str]) -> dict[str, Any]:
+def _element_content(element: Load, states: Sequence[str], text: Callable[[sp.Expr], str]) -> dict[str, Any]:
     """Return an element with its expressions as text."""
     return {
-        key: text(e)
-        if isinstance(e, sp.Expr)
-        else {k: text(v) if isinstance(v, sp.Expr) else v for k, v in e.items()}
-        if isinstance(e, Mapping)
-        else e
-        for key, e in element.items()
-    }
-
-
-def _loads_content(loads: Loads, d: Description, text: Callable[[sp.Expr], str]) -> dict[str, Any]:
-    """Return the loads of elements; what is not there is left out."""
-    states = d.traced.state_names
-
-    def element(load: Load) -> dict[str, Any]:
-        known = {"where": load.where, "rate": load.rate}
-        return {
-            "kind": load.kind,
-            "given": load.text,
-            **{key: text(e) for key, e in known.items() if e is not None},
-            "on": {states[i]: text(e) for i, e in load.direction.items()},
-        }
-
-    return {
-        "elements": {load.name: element(load) for load in loads.elements},
-        "modes": {mode: dict(zip(states, map(text, field), strict=True)) for mode, field in loads.fields.items()},
-        "powers": {key: text(power) for key, power in loads.powers.items()},
-        "energy": loads.energy,
+        "kind": element.kind,
+        "given": element.text,
+        "options": dict(element.options),
+        "where": text(element.where),
+        "on": {states[i]: text(e) for i, e in element.direction.items() if e != 0},
+        "laws": {name: text(law) for name, law in element.laws.items()},
     }
 
 
@@ -228,7 +201,7 @@ def read_system(text: str) -> System:
         )
     try:
         reader = _Reader(content)
-        system = reader.with_loads(reader.within_ranges(System(**reader.arguments())))
+        system = reader.refined(System(**reader.arguments()))
         smoothing = content.get("smoothing")
         return system if smoothing is None else system.smoothed(smoothing["eta"], smoothing.get("band", "linear"))
     except SystemDefinitionError as error:  # names and units in it may be of any length
@@ -313,17 +286,14 @@ class _Reader:
             "impacts": c.get("impacts", "simultaneous"),
         }
 
-    def kind(self, name: str) -> Any:
-        from nonsmooth.system.derived import elements
-
-        if name not in elements.__all__ or name == "Element":
-            raise SystemDefinitionError(f"there is no element {shortened(name)}")
-        return getattr(elements, name)
-
     def element(self, entry: Mapping[str, Any]) -> Any:
+        from nonsmooth.system.derived import elements
         from nonsmooth.system.derived.expressions import SPEED
 
-        kind = self.kind(entry["kind"])
+        name = entry["kind"]
+        if name not in elements.__all__ or name == "Element":
+            raise SystemDefinitionError(f"there is no element {shortened(name)}")
+        kind = getattr(elements, name)
 
         def law(text: str) -> Callable[..., Any]:
             expression = self.expression(text, {"speed": SPEED})
@@ -331,50 +301,21 @@ class _Reader:
                 return lambda t, u, p: Scalar(expression)
             return lambda v, p: Scalar(expression.subs(SPEED, v.expression))
 
-        return kind(
+        made = kind(
             **entry["options"],
             **{key: law(text) for key, text in entry["laws"].items()},
-            **{kind.kinematics: law(entry[kind.kinematics])},
+            **{kind.kinematics: law(entry["where"])},
             on={key: law(text) for key, text in entry["on"].items()},
         )
+        object.__setattr__(made, "given", str(entry["given"]))
+        return made
 
-    def within_ranges(self, system: System) -> System:
-        """The system with what its parameters must fulfil beyond what its equations say."""
+    def refined(self, system: System) -> System:
+        """The system with the powers of a mechanical one, and with what its parameters must fulfil beyond what its
+        equations say."""
         ranges = [(self.expression(e["not negative"]), e["else"]) for e in self.content.get("ranges", [])]
-        if not ranges:
-            return system
-        description = replace(system._description, ranges=tuple(ranges), variants={})
-        return type(system)._make(description, dict(system.values), variant_of(description))
-
-    def with_loads(self, system: System) -> System:
-        """The system with the loads of its elements."""
-        if "loads" not in self.content:
-            return system
-        from nonsmooth.system.derived.loads import Load, Loads
-
-        c, states = self.content["loads"], list(system.states)
-        for name in c["elements"]:
-            if f"{name}_force" not in system.outputs:
-                raise SystemDefinitionError(f"loads of an element {shortened(name)}, which is not there")
-
-        def read(text: Any) -> sp.Expr | None:
-            return None if text is None else self.expression(text)
-
-        elements = tuple(
-            Load(
-                str(name),
-                self.kind(e["kind"]).__name__,
-                str(e["given"]),
-                read(e["where"]),
-                read(e.get("rate")),
-                {states.index(state): read(one) for state, one in e["on"].items()},
-            )
-            for name, e in c["elements"].items()
-        )
-        fields = {mode: tuple(read(e[state]) for state in states) for mode, e in c["modes"].items()}
-        powers = {name: read(power) for name, power in c["powers"].items()}
-        description = system._description.with_loads(Loads(elements, fields, powers, str(c["energy"])))
-        return type(system)._make(description, dict(system.values), system._variant)
+        powers = {name: self.expression(power) for name, power in self.content.get("powers", {}).items()}
+        return system._of(system._description.refined(powers, str(self.content.get("energy", "")), ranges))
 
     def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
         if "surface" in entry:

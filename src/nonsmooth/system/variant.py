@@ -8,8 +8,8 @@ All are expanded, so that "is it constant?" is a question about free symbols.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, cached_property
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -35,8 +35,19 @@ class Variant:
         self.memory: dict[str, tuple[float, str]] = dict(description.memory)
         extra: tuple[Any, ...] = ()
         if kind == SHARP:
-            self.traced: Traced = description.with_sliding(description.traced)
-            extra = tuple(_static_ratios(description))
+            declared, surfaces = description.traced, description.surfaces
+            self.traced: Traced = declared
+            if surfaces:
+                from nonsmooth.system.derived.sliding import slide
+
+                self.traced = slide(declared, surfaces, description.scale)
+            for surface in surfaces:
+                if surface.static is not None and surface.static.free_symbols <= set(declared.p):
+                    modes = " | ".join(declared.mode_names[mode] for mode in (surface.below, surface.above))
+                    says = (
+                        f"`static` of surface {declared.indicator_names[surface.indicator]} ({modes}) must be 1 or more"
+                    )
+                    extra += ((surface.static - 1, says),)
         else:
             from nonsmooth.system.derived.smoothing import smooth
 
@@ -159,18 +170,6 @@ class Variant:
         return Derivatives(self.traced)
 
 
-def _static_ratios(description: Description) -> Iterator[tuple[Any, str]]:
-    """Excess of the static value over the kinetic one, not negative, where it depends on parameters alone."""
-    declared = description.traced
-    for surface in description.surfaces:
-        if surface.static is not None and surface.static.free_symbols <= set(declared.p):
-            names = (
-                declared.indicator_names[surface.indicator],
-                *(declared.mode_names[mode] for mode in (surface.below, surface.above)),
-            )
-            yield surface.static - 1, "`static` of surface {} ({} | {}) must be 1 or more".format(*names)
-
-
 def variant_of(description: Description, kind: str = SHARP, band: str | None = None) -> Variant:
     """Return the variant, made once for each description."""
     found = description.variants.get((kind, band))
@@ -198,15 +197,6 @@ class Derivatives:
 
     def __init__(self, traced: Traced) -> None:
         self.traced = traced
-        # One cache for each object, gone with it (a cache on the methods would keep the object alive).
-        self.field = cache(self._field)
-        self.indicator = cache(self._indicator)
-        self.indicator_hessian = cache(self._indicator_hessian)
-        self.output = cache(self._output)
-        self.reset = cache(self._reset)
-        self.write = cache(self._write)
-        self.lie = cache(self._lie)
-        self.divergence = cache(self._divergence)
 
     def variables(self, of: str) -> tuple[sp.Symbol, ...]:
         """The symbols meant by ``of``."""
@@ -220,36 +210,36 @@ class Derivatives:
         free = expression.free_symbols
         return tuple(sp.expand(expression.diff(s)) if s in free else sp.Integer(0) for s in self.variables(of))
 
-    def _field(self, mode: int, of: str = "u") -> Matrix:
+    def field(self, mode: int, of: str = "u") -> Matrix:
         """Jacobian of a vector field, (n, n_of)."""
         return tuple(self._gradient(entry, of) for entry in self.traced.fields[mode])
 
-    def _divergence(self, mode: int) -> sp.Expr:
+    def divergence(self, mode: int) -> sp.Expr:
         """Divergence of a vector field: the rate at which it changes volumes."""
         return sp.expand(sum(self.field(mode, "u")[i][i] for i in range(len(self.traced.u))))
 
-    def _indicator(self, indicator: int, of: str = "u") -> Vector:
+    def indicator(self, indicator: int, of: str = "u") -> Vector:
         """Gradient of an indicator, (n_of,)."""
         return self._gradient(self.traced.indicators[indicator], of)
 
-    def _indicator_hessian(self, indicator: int) -> Matrix:
+    def indicator_hessian(self, indicator: int) -> Matrix:
         """Second derivatives of an indicator in u, (n, n)."""
         return tuple(self._gradient(entry, "u") for entry in self.indicator(indicator, "u"))
 
-    def _output(self, output: int, mode: int, of: str = "u") -> Vector:
+    def output(self, output: int, mode: int, of: str = "u") -> Vector:
         """Gradient of an output in a mode, (n_of,)."""
         return self._gradient(self.traced.outputs[output][mode], of)
 
-    def _reset(self, transition: int, of: str = "u") -> Matrix:
+    def reset(self, transition: int, of: str = "u") -> Matrix:
         """Jacobian of the map applied at a transition, (n, n_of); the identity's where there is none."""
         reset = self.traced.transitions[transition].reset
         return tuple(self._gradient(entry, of) for entry in (self.traced.u if reset is None else reset))
 
-    def _write(self, transition: int, of: str = "u") -> dict[int, Vector]:
+    def write(self, transition: int, of: str = "u") -> dict[int, Vector]:
         """Gradients of what a transition writes, by index of memory."""
         return {i: self._gradient(value, of) for i, value in self.traced.transitions[transition].writes}
 
-    def _lie(self, indicator: int, mode: int, order: int = 1) -> sp.Expr:
+    def lie(self, indicator: int, mode: int, order: int = 1) -> sp.Expr:
         """Lie derivative of an indicator along the field of a mode, order 0 to 3 and more."""
         if order < 0:
             raise ValueError(f"the order of a Lie derivative is not negative, {order}")

@@ -22,6 +22,27 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
+#: The tables of a parameter point, by the letters of what they are for: modes, n states, h harmonics, indicators,
+#: outputs and resets.
+SHAPES = {
+    "omega": "",
+    "A": "mnn",
+    "b": "mn",
+    "c": "mhn",
+    "s": "mhn",
+    "ia": "in",
+    "ib": "i",
+    "ic": "ih",
+    "is_": "ih",
+    "oa": "omn",
+    "ob": "om",
+    "oc": "omh",
+    "os": "omh",
+    "ra": "rnn",
+    "rb": "rn",
+    "rc": "rhn",
+    "rs": "rhn",
+}
 Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> coefficient in the parameters
 
 
@@ -311,23 +332,12 @@ class _TablesCode:
 
     def shapes(self, h: int) -> dict[str, tuple[int, ...]]:
         t = self.traced
-        n, m, i, o, r = len(t.u) + len(t.m), len(t.fields), len(t.indicators), len(t.outputs), len(t.transitions)
-        return {
-            "omega": (),
-            "A": (m, n, n),
-            "b": (m, n),
-            "c": (m, h, n),
-            "s": (m, h, n),
-            "ia": (i, n),
-            "ib": (i,),
-            "ic": (i, h),
-            "is_": (i, h),
-            "oa": (o, m, n),
-            "ob": (o, m),
-            "oc": (o, m, h),
-            "os": (o, m, h),
-            "ra": (r, n, n),
-            "rb": (r, n),
-            "rc": (r, h, n),
-            "rs": (r, h, n),
+        sizes = {
+            "n": len(t.u) + len(t.m),
+            "m": len(t.fields),
+            "i": len(t.indicators),
+            "o": len(t.outputs),
+            "r": len(t.transitions),
+            "h": h,
         }
+        return {name: tuple(sizes[letter] for letter in letters) for name, letters in SHAPES.items()}

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import sympy
 from sympy import Basic, Expr, Symbol
+from sympy.logic.boolalg import Boolean
 
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.codegen import recurrences
 from nonsmooth.system.codegen.recurrences import Node
-from nonsmooth.system.symbolic.printing import Printer, assignments, is_corner
+from nonsmooth.system.symbolic.printing import CORNERS, Printer, assignments
 
 ZERO, ONE = sympy.S.Zero, sympy.S.One
 _NAMED = re.compile(r"\bh\d+\b")
@@ -155,7 +156,7 @@ class Series:
             return self._power(*e.args)
         if isinstance(e, sympy.Piecewise) and not any(c.free_symbols & self._variables for _, c in e.args):
             return self._chosen(e)
-        if is_corner(e):
+        if isinstance(e, (*CORNERS, Boolean)):
             raise CornerError(f"{e} has a corner")
         if isinstance(e, sympy.atan2):
             return self._atan2(*e.args)

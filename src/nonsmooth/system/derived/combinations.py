@@ -144,7 +144,8 @@ def _written_out(
                 transitions.append(Transition(here, name(mode, there), when=when, reset=reset, contact=contact))
                 kinds.append(ALONE if make.asks and part.element.held else "")
         if make.asks:
-            asked.append((here, TOGETHER, _meetings(make, mode, pattern), -1))
+            met = [make.condition([one], make.parts[k].name) for k, one in make.meetings(mode, pattern)]
+            asked.append((here, TOGETHER, " and ".join(met), -1))
         for item in given["transitions"]:
             if isinstance(item, Surface) and item.below == mode:
                 ends = name(item.below, pattern), name(item.above, pattern)
@@ -176,11 +177,6 @@ def _written_out(
         "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None,
         "make": make,
     }
-
-
-def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
-    """The condition whose parts vanish where an element that is not held meets its own."""
-    return " and ".join(make.condition([one], make.parts[k].name) for k, one in make.meetings(mode, pattern))
 
 
 def _decide_together(make: Expressions, base: Mapping[str, Any], resets: bool) -> bool:

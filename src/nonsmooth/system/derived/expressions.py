@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -78,18 +78,12 @@ class Expressions(Assembler):
             return call_scalar(given, (Scalar(side * part.where), self.symbols.parameters()), what)
         return self._given(given, what)
 
-    @property
-    def names(self) -> list[str]:
-        """Names of the states."""
-        return list(self.symbols.u)
-
     def spoken(self, k: int, name: str) -> sp.Expr:
         """A law as an expression; one of the speed's magnitude in the symbol ``SPEED``."""
         given = getattr(self.parts[k].element, name)
         if callable(given) and _arguments(given) == 2:
             return call_scalar(given, (Scalar(SPEED), self.symbols.parameters()), name)
-        known = {part.name for part in self.parts}
-        return sp.Integer(0) if isinstance(given, str) and given in known else self.law(k, name)
+        return self.law(k, name)
 
     # Calculus
 
@@ -200,25 +194,6 @@ class Expressions(Assembler):
                 return False
         return True
 
-    def described(self) -> dict[str, dict[str, Any]]:
-        """The elements as data: kind, options, and expressions of where they are, what they act on, and their laws."""
-        found = {}
-        for k, part in enumerate(self.parts):
-            e, others = part.element, {other.name for other in self.parts} - {part.name}
-            known = {"at", "on", e.kinematics, "position", "belt", *e.laws}
-            options = {one.name: getattr(e, one.name) for one in fields(e) if one.name not in known}
-            named = {name: getattr(e, name) for name in e.laws if isinstance(getattr(e, name), str)}
-            options |= {name: value for name, value in named.items() if value in others}
-            laws = {name: self.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
-            found[part.name] = {
-                "kind": type(e).__name__,
-                "options": options,
-                e.kinematics: part.where,
-                "on": {self.names[i]: d for i, d in part.direction.items() if d != 0},
-                "laws": {name: law for name, law in laws.items() if name not in options},
-            }
-        return found
-
     # What a user would have written
 
     def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
@@ -230,7 +205,8 @@ class Expressions(Assembler):
             here = self.place(k, mode, (0,) * len(self.parts))
             rows = [(sp.sympify(e), text) for e, text in here.element.ranges(here)]
             found += [(e, text) for e, text in rows if e.free_symbols and e.free_symbols <= known]
-            given = (*here.element.limits(here), here.effect())
+            read = isinstance(here.element.given, str)  # of a text: it was given before, at other values maybe
+            given = () if read else (*here.element.limits(here), here.effect())
             for e, sentence in (*rows, *((sp.sympify(sp.sympify(e).xreplace(self.values)), text) for e, text in given)):
                 if e.is_number and e < 0:
                     raise SystemDefinitionError(sentence)

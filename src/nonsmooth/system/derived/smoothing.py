@@ -106,13 +106,6 @@ def _oriented(outer: int, inner: int, jumps: Sequence[TracedTransition]) -> _Mod
     return _ModePair(outer, inner, rows)
 
 
-def smoothed_indicators(description: Description) -> tuple[str, ...]:
-    """Names of the indicators that get a band, in order of their use."""
-    traced, _ = without_sticking(description.traced)
-    names = traced.indicator_names
-    return tuple(dict.fromkeys(names[row.indicator] for pair in _pairs(traced) for row in pair.rows))
-
-
 class _Bands(Additions):
     """The bands that are added to the sharp system."""
 
@@ -175,9 +168,12 @@ class _Bands(Additions):
         given = self.description.bands if self.shape == "linear" else ()
         own: TracedBand | None = next((band for band in given if band.indicator == row.indicator), None)
         writes = []
+
+        def mixed(a: sp.Expr, b: sp.Expr) -> sp.Expr:
+            return a if a == b else (1 - q) * a + q * b
+
         if own is None:
-            mixed = zip(self.traced.fields[pair.outer], self.traced.fields[pair.inner], strict=True)
-            field = tuple(a if a == b else (1 - q) * a + q * b for a, b in mixed)
+            field = tuple(map(mixed, self.traced.fields[pair.outer], self.traced.fields[pair.inner]))
         else:
             field = tuple(entry.subs(own.eta, eta) for entry in own.field)
             for key, unit, symbol, value in own.memory:
@@ -185,19 +181,17 @@ class _Bands(Additions):
                     self.m.append(symbol)
                     self.memory.append((key, unit))
                 writes.append((self.m.index(symbol), value.subs(own.eta, eta)))
-        for index, row_of in enumerate(self.outputs):
-            a, b = row_of[pair.outer], row_of[pair.inner]
-            if own is not None and index in own.outputs:
-                row_of.append(own.outputs[index].subs(own.eta, eta))
-            else:
-                row_of.append(a if a == b else (1 - q) * a + q * b)
-        self.modes.append(label)
-        self.fields.append(field)
+        shown = [mixed(row[pair.outer], row[pair.inner]) for row in self.outputs]
+        if own is not None:
+            for index, output in own.outputs.items():
+                shown[index] = output.subs(own.eta, eta)
+        self.mode(label, field, shown)
         return len(self.modes) - 1, tuple(writes)
 
     def add(self, pair: _ModePair) -> None:
         """Add the bands of a pair and the transitions over their borders."""
-        kept = [r for r, row in enumerate(pair.rows) if not self._repeats(pair, r)]
+        margins = [self.margin(row) for row in pair.rows]  # one that repeats another needs no band of its own
+        kept = [r for r, m in enumerate(margins) if all(sp.expand(m - before) != 0 for before in margins[:r])]
         bands = {r: self.band(pair, pair.rows[r]) for r in kept}
         least = {
             r: tuple(self.least(_ModePair(0, 0, tuple(pair.rows[s] for s in kept)), k)) for k, r in enumerate(kept)
@@ -243,11 +237,6 @@ class _Bands(Additions):
         self.outputs = [[mean(row)] * len(self.modes) for row in self.outputs]
         self.jumps = list(self.traced.transitions)
 
-    def _repeats(self, pair: _ModePair, r: int) -> bool:
-        """Return whether an earlier row is the same function of the state."""
-        row = pair.rows[r]
-        return any(sp.expand(self.margin(row) - self.margin(earlier)) == 0 for earlier in pair.rows[:r])
-
 
 def smooth(description: Description, single: bool, shape: str = "linear") -> Smoothed:
     """Derive the smoothed system.
@@ -265,7 +254,9 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
     SystemDefinitionError
         Transitions with a reset, at a time, without a way back, or bands that overlap: the pair is named.
     """
-    wanted = smoothed_indicators(description)
+    old, apart = without_sticking(description.traced)
+    pairs = _pairs(old)
+    wanted = list(dict.fromkeys(old.indicator_names[row.indicator] for pair in pairs for row in pair.rows))
     etas = (("eta", None),) if single else tuple((f"eta_{name}", name) for name in wanted)
     taken = {*description.parameters, *description.states, *description.memory}
     for name, _ in etas:
@@ -276,9 +267,7 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
             )
     symbols = {name: sp.Symbol(f"p_{name}", real=True) for name, _ in etas}
     of = {name: symbols["eta" if single else f"eta_{name}"] for name in wanted}
-    old, apart = without_sticking(description.traced)
     apart += _check_surfaces(description)
-    pairs = _pairs(old)
     build = _Bands(replace(description, traced=old), of, shape)
     if shape == "arctan":
         if alone := [name for i, name in enumerate(old.mode_names) if all(i not in (p.outer, p.inner) for p in pairs)]:

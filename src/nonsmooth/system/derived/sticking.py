@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -110,6 +110,13 @@ class Additions:
             self.indicator_names.append(name)
             self.indicators.append(expression)
         return self.indicator_names.index(name)
+
+    def mode(self, name: str, field: Sequence[sp.Expr], outputs: Iterable[sp.Expr]) -> None:
+        """Add a mode with its field and outputs."""
+        self.modes.append(name)
+        self.fields.append(tuple(field))
+        for row, entry in zip(self.outputs, outputs, strict=True):
+            row.append(entry)
 
     def jump(
         self, source: int, target: int, *rows: TracedCondition, writes: tuple[tuple[int, sp.Expr], ...] = ()

@@ -10,7 +10,7 @@ of one another. Anything else needs ``period=``, which is checked against the eq
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -128,57 +128,53 @@ def check_period(
                 )
 
 
+#: Of each kind of rule, which finite numbers it allows, and the sentence on another.
+_RULES: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "nonzero": (lambda x: x != 0, "{given} makes {owner} divide by zero: {text} = {number}"),
+    "nonnegative": (lambda x: x >= 0, "{given} makes {owner} take the root of {text}, which is not positive"),
+    "positive": (lambda x: x > 0, "{given} makes {owner} take the logarithm of {text}, which is not positive"),
+    "period": (
+        lambda x: x > 0,
+        "{given} makes the forcing period {text} = {number}; it must be positive and finite",
+    ),
+    "phase": (
+        lambda x: (x >= 0) & (x < 1),
+        "{given} makes {owner}, {text}, {number}; a phase is in forcing periods, 0 <= at < 1",
+    ),
+    "apart": (lambda x: x >= 0, "{given}: {owner}"),
+}
+
+
 class _Rule:
     """One expression of the parameters and what it must be."""
 
     def __init__(self, expression: sp.Expr, kind: str, owner: str, traced: Traced) -> None:
-        self.expression, self.kind, self.owner = expression, kind, owner
-        self._symbols, self._names = traced.p, traced.parameter_names
-        self.used = {
-            name
-            for symbol, name in zip(traced.p, traced.parameter_names, strict=True)
-            if symbol in expression.free_symbols
-        }
+        self.expression, self.owner, self.traced = expression, owner, traced
+        self._allowed, self._says = _RULES[kind]
+        known = zip(traced.p, traced.parameter_names, strict=True)
+        self.used = [name for symbol, name in known if symbol in expression.free_symbols]
 
     @cached_property
     def _scalar(self) -> Any:
-        return sp.lambdify(self._symbols, self.expression, modules="math")
+        return sp.lambdify(self.traced.p, self.expression, modules="math")
 
     @cached_property
     def of_rows(self) -> Any:
-        return sp.lambdify(self._symbols, self.expression, modules="numpy")
+        return sp.lambdify(self.traced.p, self.expression, modules="numpy")
 
     def check(self, values: Mapping[str, float]) -> None:
         try:
-            number = float(self._scalar(*(values[name] for name in self._names)))
+            number = float(self._scalar(*(values[name] for name in self.traced.parameter_names)))
         except (ArithmeticError, ValueError, TypeError):
             number = math.nan
         if not self.allows(number):
-            raise SystemDefinitionError(self._sentence(values, number))
+            given = ", ".join(f"{name} = {values[name]!r}" for name in self.used)
+            text = self.expression.subs({s: sp.Symbol(n) for s, n in self.traced.named().items()})
+            says = self._says.format(given=given, owner=self.owner, text=text, number=number)
+            raise SystemDefinitionError(says)
 
     def allows(self, number: Any) -> Any:
-        finite = np.isfinite(number)
-        if self.kind == "nonzero":
-            return finite & (number != 0)
-        if self.kind == "phase":
-            return finite & (number >= 0) & (number < 1)
-        if self.kind in ("nonnegative", "apart"):
-            return finite & (number >= 0)
-        return finite & (number > 0)
-
-    def _sentence(self, values: Mapping[str, float], number: float) -> str:
-        given = ", ".join(f"{name} = {values[name]!r}" for name in self._names if name in self.used)
-        text = str(self.expression.subs({s: sp.Symbol(n) for s, n in zip(self._symbols, self._names, strict=True)}))
-        if self.kind == "apart":
-            return f"{given}: {self.owner}"
-        if self.kind == "period":
-            return f"{given} makes the forcing period {text} = {number}; it must be positive and finite"
-        if self.kind == "phase":
-            return f"{given} makes {self.owner}, {text}, {number}; a phase is in forcing periods, 0 <= at < 1"
-        if self.kind == "nonzero":
-            return f"{given} makes {self.owner} divide by zero: {text} = {number}"
-        what = "root" if self.kind == "nonnegative" else "logarithm"
-        return f"{given} makes {self.owner} take the {what} of {text}, which is not positive"
+        return np.isfinite(number) & self._allowed(number)
 
 
 class Domain:
@@ -216,20 +212,20 @@ class Domain:
         self._rules += [_Rule(phase, "phase", owner, traced) for owner, phase in phases.items()]
         self._rules += [_Rule(expression, "apart", message, traced) for expression, message in apart]
 
-    def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None) -> None:
+    def check(self, values: Mapping[str, float], changed: Collection[str] | None = None) -> None:
         """Raise SystemDefinitionError where ``values`` are not allowed.
 
         Parameters
         ----------
         values : mapping of name to float
-        changed : iterable of str, optional
+        changed : collection of str, optional
             Only what depends on these has to be looked at.
         """
         for name in values if changed is None else changed:
             if name in self._zero and values[name] == 0:
                 raise SystemDefinitionError(self._by_zero(name))
         for rule in self._rules:
-            if changed is None or not rule.used.isdisjoint(changed):
+            if changed is None or any(name in changed for name in rule.used):
                 rule.check(values)
 
     def _by_zero(self, name: str) -> str:

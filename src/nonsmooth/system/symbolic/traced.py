@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -27,8 +27,7 @@ def along(expression: Expr, t: Symbol, u: Iterable[Symbol], field: Iterable[Expr
     return expression.diff(t) + sum(expression.diff(symbol) * entry for symbol, entry in zip(u, field, strict=True))
 
 
-@dataclass(frozen=True)
-class TracedCondition:
+class TracedCondition(NamedTuple):
     """One sign condition: ``sign * indicator > 0`` (``>= 0`` where not strict).
 
     A non-strict row settles a tie in derived systems (the smoothed switch, the regions of a map): it also holds where

@@ -11,10 +11,8 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
+from nonsmooth.system.symbolic.printing import CORNERS
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, exact, to_expression
-
-# What no method can see inside a mode: the derivative jumps and nothing says where.
-_CORNERS = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
 
 _LARGEST = sp.Integer(int(sys.float_info.max))
 
@@ -46,6 +44,18 @@ class Symbols:
         self.p = {key: sp.Symbol(f"p_{key}", real=True) for key in parameters}
         self.m = {key: sp.Symbol(f"m_{key}", real=True) for key in memory}
         self.inputs = {key: self.u[key] for key in inputs}
+
+    def of_traced(self) -> dict[str, Any]:
+        """The symbols and their names, as parts of a `Traced`."""
+        return {
+            "t": self.t,
+            "u": tuple(self.u.values()),
+            "p": tuple(self.p.values()),
+            "m": tuple(self.m.values()),
+            "state_names": tuple(self.u),
+            "parameter_names": tuple(self.p),
+            "memory_names": tuple(self.m),
+        }
 
     def states(self, names: Sequence[str] | None = None, owner: str | None = None) -> States:
         """The state vector as a function sees it: all states, or those a mode has."""
@@ -249,7 +259,7 @@ def _entry(value: Any, what: str) -> sp.Expr:
 
 def refuse_corners(expression: sp.Expr, state: set[sp.Symbol], what: str) -> None:
     """Raise where ``expression`` has a corner (abs, sign, max, where, ...) in one of the symbols ``state``."""
-    for corner in expression.atoms(*_CORNERS):
+    for corner in expression.atoms(*CORNERS):
         if corner.free_symbols & state:
             kind = {"Piecewise": "where", "Abs": "abs", "Max": "max", "Min": "min"}.get(
                 type(corner).__name__, type(corner).__name__

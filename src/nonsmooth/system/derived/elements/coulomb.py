@@ -1,4 +1,4 @@
-"""Dry friction with sticking."""
+"""Dry friction with sticking: by a normal force that is given, or under the force of a rigid stop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,35 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coulomb(Element):
+class Friction(Element):
+    """The ground of all friction: it holds a relative speed at zero, or slips one way or the other."""
+
+    speed: Callable[..., Any] | None = None
+    belt: Law = 0.0
+    friction: Law = 0.0
+
+    kinematics = "speed"
+    held = ("stick",)
+    sides = ("forward", "back")
+
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        return v - law(self.belt)
+
+    def rate(self, here: Place) -> Any:
+        return here.where
+
+    def pull(self, here: Place) -> Any:
+        return -here.where
+
+    def lies(self, where: float, rate: float, slow: float) -> int:
+        return int(np.sign(rate))
+
+    def meeting(self, here: Place) -> list[list[Condition]]:
+        return [[Condition(here.where, -1 if here.phase == "forward" else 1, "speed")]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coulomb(Friction):
     r"""Dry friction with sticking: F = -f(v) sgn v while it slips, what holds v = 0 while it sticks.
 
     It sticks as long as the force that holds it stays below ``static``; Stribeck curves are functions ``friction(v)``
@@ -39,13 +67,9 @@ class Coulomb(Element):
         See :class:`Element`.
     """
 
-    speed: Callable[..., Any] | None = None
-    belt: Law = 0.0
-    friction: Law = 0.0
     static: Law | None = None
     normal: Law | None = None
 
-    kinematics = "speed"
     phases = ("stick", "forward", "back")
     laws = ("friction", "static", "normal")
     conditions = (
@@ -57,11 +81,6 @@ class Coulomb(Element):
         "turned_forward",
         "turned_back",
     )
-    held = ("stick",)
-    sides = ("forward", "back")
-
-    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        return v - law(self.belt)
 
     def needs(self, others: Collection[str]) -> list[tuple[str, int | None]]:
         sides = (1, -1, 0) if self.static is None else (1, -1)
@@ -83,12 +102,6 @@ class Coulomb(Element):
             less = f"the static friction of {name} must not be less than its kinetic friction (it is no ratio of both)"
             rows.append((static - kinetic, less))
         return rows
-
-    def rate(self, here: Place) -> Any:
-        return here.where
-
-    def pull(self, here: Place) -> Any:
-        return -here.where
 
     def force(self, here: Place) -> Any:
         side = 1 if here.phase == "forward" else -1
@@ -113,12 +126,6 @@ class Coulomb(Element):
         """The greatest force that holds."""
         static = here.law("friction", 0) if self.static is None else here.law("static")
         return static * self.pressure(here)
-
-    def lies(self, where: float, rate: float, slow: float) -> int:
-        return int(np.sign(rate))
-
-    def meeting(self, here: Place) -> list[list[Condition]]:
-        return [[Condition(here.where, -1 if here.phase == "forward" else 1, "speed")]]
 
     def leaving(self, here: Place) -> list[Leaving]:
         v, hold, most = here.where, here.put("stick").holding(), self.most(here)

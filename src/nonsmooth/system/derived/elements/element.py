@@ -75,7 +75,7 @@ class Element(ABC):
     drives: ClassVar[str] = "drives its speed up"  # a positive force
     slow: ClassVar[float] = SLOW  # of the scale of its rate: below it it may hold, where a place decides
     presses: ClassVar[bool] = False  # its law is a normal force for friction
-    given: ClassVar[Any] = None  # on an element that stands for one with ``at``: that one
+    given: ClassVar[Any] = None  # on an element that stands for one with ``at``: that one; of a text: its own text
 
     def __post_init__(self) -> None:
         label = type(self).__name__
