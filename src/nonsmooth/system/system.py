@@ -312,7 +312,7 @@ class System(Answering):
         ------
         SystemDefinitionError
             Transitions with a reset (impacts) or at a time, hysteresis, static friction above the kinetic one, or bands
-            that overlap: the pair is named.
+            that overlap without crossing, as those of three regions do: the pair is named.
 
         See Also
         --------

@@ -28,15 +28,22 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
             for row in jump.rows:
                 rising.setdefault((jump.target, row.indicator), {}).setdefault(row.sign, jump.source)
     sticks = {key: found for key, found in rising.items() if len(found) == 2 and found[1] != found[-1]}
-    dropped = sorted({mode for mode, _ in sticks})
+    dropped = {mode for mode, _ in sticks}
     if not dropped:
         return traced, []
     apart = [needed for (mode, h), ends in sticks.items() for needed in _equal_friction(traced, mode, h, ends)]
-    between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & set(dropped)}
-    kept = [mode for mode in range(len(traced.mode_names)) if mode not in dropped]
+    between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & dropped}
+    left = [jump for jump in traced.transitions if not {jump.source, jump.target} & dropped]
+    joined = {end for ends in sticks.values() for end in ends.values()} - dropped
+    while (
+        more := {end for jump in left if {jump.source, jump.target} & joined for end in (jump.source, jump.target)}
+        - joined
+    ):
+        joined |= more
+    kept = sorted(joined)  # where two stick at once, a question led there and back
     jumps: dict[tuple[int, int, tuple[TracedCondition, ...]], TracedTransition] = {}
-    for jump in traced.transitions:
-        if jump.source in dropped or jump.target in dropped:
+    for jump in left:
+        if jump.source not in joined:
             continue
         rows, h = jump.rows, between.get(frozenset((jump.source, jump.target)))
         if h is not None and jump.reset is None:
@@ -85,7 +92,9 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
         if not shared:
             continue  # a state beyond the surface
         ratio = sp.cancel(rate.diff(shared[0]) / end.diff(shared[0]))
-        excess = sp.simplify(rate - ratio * end)
+        largest = LEVEL * max(abs(number) for number in rate.as_coefficients_dict().values())
+        terms = sp.expand(rate - ratio * end).as_coefficients_dict().items()  # those of rounding are none
+        excess = sp.simplify(sp.Add(*(number * term for term, number in terms if abs(number) > largest)))
         if excess == 0:
             continue
         if excess.free_symbols & moving or (excess.is_number and abs(excess) > LEVEL):
@@ -119,11 +128,16 @@ class Additions:
             row.append(entry)
 
     def jump(
-        self, source: int, target: int, *rows: TracedCondition, writes: tuple[tuple[int, sp.Expr], ...] = ()
+        self,
+        source: int,
+        target: int,
+        *rows: TracedCondition,
+        writes: tuple[tuple[int, sp.Expr], ...] = (),
+        contact: bool | None = None,
     ) -> None:
-        """Add a transition."""
-        label = f"{self.modes[source]} -> {self.modes[target]}"
-        self.jumps.append(TracedTransition(source, target, rows, None, None, writes, source == 0, label))
+        """Add a transition; without ``contact`` one begins where it leaves the first mode."""
+        label, begins = f"{self.modes[source]} -> {self.modes[target]}", source == 0 if contact is None else contact
+        self.jumps.append(TracedTransition(source, target, rows, None, None, writes, begins, label))
 
     def put_in(self, **more: Any) -> Traced:
         """The derived system; ``more``: its other fields that differ."""
