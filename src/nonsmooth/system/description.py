@@ -172,10 +172,8 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
     traced, explicit = _with_period(traced, symbols, values, given["period"])
     if symmetry is not None:
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
-    if "patterns" in made:
-        traced = made["patterns"].bind(traced)
-    elif made.get("decider") is not None:
-        traced = made["decider"].decides(traced, made["kinds"], made["asked"])
+    if made.get("bind") is not None:
+        traced = made["bind"](traced)
     units_out = {key: unit for key, (_, unit) in shown.items()}
     loads = None
     if given["elements"]:
