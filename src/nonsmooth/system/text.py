@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
@@ -75,7 +76,7 @@ def _content(d: Description) -> dict[str, Any]:
     from nonsmooth.system.derived.expressions import SPEED
 
     t, surfaces = (d.traced, d.surfaces) if d.plain is None else d.plain()
-    names = {**d.symbol_names, SPEED: "speed"}
+    names = {**d.traced.named("u.", "p."), SPEED: "speed"}
 
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
@@ -162,7 +163,7 @@ def _element_content(element: Load, states: Sequence[str], text: Callable[[sp.Ex
     return {
         "kind": element.kind,
         "given": element.text,
-        "options": dict(element.options),
+        "options": {key: one.item() if isinstance(one, np.generic) else one for key, one in element.options.items()},
         "where": text(element.where),
         "on": {states[i]: text(e) for i, e in element.direction.items() if e != 0},
         "laws": {name: text(law) for name, law in element.laws.items()},
@@ -170,7 +171,9 @@ def _element_content(element: Load, states: Sequence[str], text: Callable[[sp.Ex
 
 
 def _band_content(band: Any, d: Description) -> dict[str, Any]:
-    names = d.symbol_names | {band.eta: "p.eta"} | {symbol: f"p.{name}" for name, _, symbol, _ in band.memory}
+    names = (
+        d.traced.named("u.", "p.") | {band.eta: "p.eta"} | {symbol: f"p.{name}" for name, _, symbol, _ in band.memory}
+    )
     t = d.traced
     return {
         "field": {s: write_expression(e, names) for s, e in zip(t.state_names, band.field, strict=True)},
