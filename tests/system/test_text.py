@@ -86,7 +86,7 @@ ALONE = {
     "friction": Coulomb(at="q", friction=lambda v, p: p.mu / (1 + v), static=0.3, belt="F"),
     "spring": PreloadedSpring(at="q", preload="mu", stiffness=lambda t, u, p: 2 * p.mu),
     "play": Backlash(at="q", half_width=2.0, stiffness=3.0, damping="mu"),
-    "support": ElasticStop(at="q", position="mu", stiffness=9.0, damping=0.1, pulls=True, side=-1),
+    "support": ElasticStop(at="q", position="mu", stiffness=9.0, damping=0.1, pulls=np.True_, side=np.int64(-1)),
 }
 POWER = {"outputs": {"power": (lambda t, u, p: u.v_q * p.F, "W")}}
 MIRRORED = {

@@ -106,15 +106,10 @@ class Description:
     def symbol_units(self) -> dict[sp.Symbol, str]:
         """Units of the symbols of states, parameters and memory; the time's is s where a state has a unit."""
         t = self.traced
-        units = dict(zip(t.u, self.states.values(), strict=True))
-        units |= {s: parameter.unit for s, parameter in zip(t.p, self.parameters.values(), strict=True)}
-        units |= {s: unit for s, (_, unit) in zip(t.m, self.memory.values(), strict=True)}
-        return units | {t.t: "s" if any(self.states.values()) else ""}
-
-    @property
-    def symbol_names(self) -> dict[sp.Symbol, str]:
-        """Names of the symbols in text: ``t``, ``u.x``, ``p.k`` (memory is read as ``p.`` too)."""
-        return self.traced.named("u.", "p.")
+        units = [*self.states.values(), *(parameter.unit for parameter in self.parameters.values())]
+        units += [unit for _, unit in self.memory.values()]
+        time = "s" if any(self.states.values()) else ""
+        return {**dict(zip((*t.u, *t.p, *t.m), units, strict=True)), t.t: time}
 
 
 def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
@@ -172,10 +167,8 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
     traced, explicit = _with_period(traced, symbols, values, given["period"])
     if symmetry is not None:
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
-    if "patterns" in made:
-        traced = made["patterns"].bind(traced)
-    elif made.get("decider") is not None:
-        traced = made["decider"].decides(traced, made["kinds"], made["asked"])
+    if made.get("bind") is not None:
+        traced = made["bind"](traced)
     units_out = {key: unit for key, (_, unit) in shown.items()}
     loads = None
     if given["elements"]:

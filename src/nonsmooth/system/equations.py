@@ -51,18 +51,17 @@ def trace_system(
     outputs: Mapping[str, tuple[Any, str]],
 ) -> Traced:
     """Trace everything but the period. ``modes``: name -> (function, its states); ``outputs``: name -> (f, unit)."""
-    time, p = Scalar(symbols.t), symbols.parameters()
     moving = {symbols.t, *symbols.u.values()}
     everything = tuple(symbols.u)
     fields, lacking = [], []
     for key, (function, own) in modes.items():
-        arguments = time, symbols.states(own, f"mode {key!r}"), p
+        arguments = symbols.arguments(own, f"mode {key!r}")
         fields.append(_states(function, arguments, own, f"the vector field of mode {key!r}", everything, moving))
         lacking.append(tuple(state not in own for state in everything))
     surfaces_of = []
     for key, function in indicators.items():
         what = f"indicator {key!r}"
-        expression = call_scalar(function, (time, symbols.states(), p), what)
+        expression = call_scalar(function, symbols.arguments(), what)
         refuse_corners(expression, moving, what)
         if not isinstance(function, KnownFunction) and not expression.free_symbols & set(symbols.u.values()):
             raise SystemDefinitionError(
@@ -81,7 +80,7 @@ def trace_system(
         if isinstance(item, Surface):
             jumps += _surface_jumps(item, owned, indicators)
         elif isinstance(item, Transition):
-            jumps.append(_jump(item, symbols, time, owned, indicators, surfaces_of))
+            jumps.append(_jump(item, symbols, owned, indicators, surfaces_of))
         else:
             raise SystemDefinitionError(
                 f"{name!r}: `transitions` is a list of ns.Transition and ns.Surface, not {shortened(item)}; "
@@ -97,7 +96,7 @@ def trace_system(
         lacking=tuple(lacking),
         indicators=tuple(surfaces_of),
         transitions=tuple(jumps),
-        outputs=tuple(_trace_output(k, f, symbols, time, owned) for k, (f, _) in outputs.items()),
+        outputs=tuple(_trace_output(k, f, symbols, owned) for k, (f, _) in outputs.items()),
         period=None,
     )
 
@@ -153,7 +152,7 @@ def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) ->
     modes, moving = traced.mode_names, {symbols.t, *symbols.u.values()}
     below = modes.index(item.below)
     own = tuple(n for n, gone in zip(traced.state_names, traced.lacking[below], strict=True) if not gone)
-    arguments = Scalar(symbols.t), symbols.states(own, f"mode {item.below!r}"), symbols.parameters()
+    arguments = symbols.arguments(own, f"mode {item.below!r}")
     static, field = item.static, None
     if callable(static):
         static = call_scalar(static, arguments, f"`static` of {item.label}")
@@ -169,7 +168,6 @@ def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) ->
 def _jump(
     item: Transition,
     symbols: Symbols,
-    time: Any,
     modes: Mapping[str, tuple[str, ...]],
     indicators: Mapping[str, Any],
     expressions: Sequence[sp.Expr],
@@ -188,10 +186,10 @@ def _jump(
                 f"{label}: the indicator {order[row.indicator]!r} involves the state {hidden[symbol]!r}, which mode "
                 f"{item.source!r} does not have"
             )
-    u, p = symbols.states(before, f"mode {item.source!r}"), symbols.parameters()
+    arguments = symbols.arguments(before, f"mode {item.source!r}")
     reset = None
     if item.reset is not None:
-        reset = _states(item.reset, (time, u, p), after, f"the reset of {label}", symbols.u, set())
+        reset = _states(item.reset, arguments, after, f"the reset of {label}", symbols.u, set())
     elif not set(after) <= set(before):
         new = [state for state in after if state not in before]
         raise SystemDefinitionError(
@@ -202,7 +200,7 @@ def _jump(
     for key, function in (item.write or {}).items():
         if key not in symbols.m:
             raise SystemDefinitionError(f"{label}: {unknown(key, 'memory', 'this system', list(symbols.m))}")
-        value = call_scalar(function, (time, u, p), f"what {label} writes to {key!r}")
+        value = call_scalar(function, arguments, f"what {label} writes to {key!r}")
         writes.append((list(symbols.m).index(key), value))
     contact = item.begins_contact(next(iter(modes)))
     at = _phase(item.at, label, symbols) if callable(item.at) else item.at
@@ -222,10 +220,7 @@ def _phase(given: Callable[..., Any], label: str, symbols: Symbols) -> float | s
     return phase
 
 
-def _trace_output(
-    key: str, given: Any, symbols: Symbols, time: Any, modes: Mapping[str, tuple[str, ...]]
-) -> tuple[sp.Expr, ...]:
-    p = symbols.parameters()
+def _trace_output(key: str, given: Any, symbols: Symbols, modes: Mapping[str, tuple[str, ...]]) -> tuple[sp.Expr, ...]:
     if isinstance(given, Mapping):
         for mode in given:
             if mode not in modes:
@@ -233,10 +228,10 @@ def _trace_output(
         if missing := [mode for mode in modes if mode not in given]:
             raise SystemDefinitionError(f"output {key!r} is not given in mode {missing[0]!r}")
         return tuple(
-            call_scalar(given[mode], (time, symbols.states(own, f"mode {mode!r}"), p), f"output {key!r} in {mode!r}")
+            call_scalar(given[mode], symbols.arguments(own, f"mode {mode!r}"), f"output {key!r} in {mode!r}")
             for mode, own in modes.items()
         )
-    expression = call_scalar(given, (time, symbols.states(), p), f"output {key!r}")
+    expression = call_scalar(given, symbols.arguments(), f"output {key!r}")
     for mode, own in modes.items():
         if expression.free_symbols & {symbol for state, symbol in symbols.u.items() if state not in own}:
             raise SystemDefinitionError(

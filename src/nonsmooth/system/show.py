@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import sympy as sp
@@ -58,14 +59,14 @@ def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
     lines: list[tuple[str, str]] = []
     short = loads is not None and bool(loads.elements) and not system.is_smoothed and not verbose
 
-    def unit(text: str) -> str:
-        return f" [{text}]" if text else ""
+    def listed(units: Mapping[str, str]) -> str:
+        return ", ".join(f"{name} [{unit}]" if unit else name for name, unit in units.items())
 
-    lines.append(("states", ", ".join(f"{name}{unit(u)}" for name, u in system.states.items())))
+    lines.append(("states", listed(system.states)))
     values = (f"{k} = {v.value:.12g}{' ' * bool(v.unit)}{v.unit}" for k, v in system.parameters.items())
     lines.append(("parameters", ", ".join(values) or "none"))
     if system.memory:
-        lines.append(("memory", ", ".join(f"{name}{unit(u)}" for name, u in system.memory.items())))
+        lines.append(("memory", listed(system.memory)))
     modes = traced.mode_names, traced.fields, traced.lacking
     if short and loads is not None:
         modes = tuple(loads.fields), tuple(loads.fields.values()), len(loads.fields) * (traced.lacking[0],)
@@ -100,7 +101,7 @@ def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
         count = f"{len(system.modes)}, with {len(system.declared.transitions)} transitions"
         lines.append(("modes", f"{count}: print(system.summary(verbose=True)) shows them"))
     if system.outputs:
-        lines.append(("outputs", ", ".join(f"{name}{unit(u)}" for name, u in system.outputs.items())))
+        lines.append(("outputs", listed(system.outputs)))
     lines.append(("period", _period(system, names)))
     if system.is_smoothed:
         lines.append(("smoothing", f"eta = {system.eta}, {system.band} band"))

@@ -238,7 +238,7 @@ class System(Answering):
 
     def period(self) -> float | None:
         """Return the forcing period at the present values of the parameters; None where there is none."""
-        return self._variant.period_at(self.values, self.values)
+        return self.period_at(self.values)
 
     def period_at(self, values: Mapping[str, float] | Sequence[float] | np.ndarray) -> float | None:
         """Return the forcing period at other values: a mapping (others stay), or a vector in declared order."""

@@ -10,15 +10,15 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.description import Description
-from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.inputs import input_states
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import Scalar
-from nonsmooth.system.symbolic.traced import Traced, TracedCondition
+from nonsmooth.system.symbolic.traced import TracedCondition
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols
 from nonsmooth.system.transition import Band, Mode, Surface, Transition, condition_text
 
@@ -71,79 +71,91 @@ def _pieces(
 
 
 def _content(d: Description) -> dict[str, Any]:
-    """A system with elements as it was given: its equations without them, and the elements."""
+    """A system with elements as it was given: its equations without them, and the elements; what it has not is left
+    out."""
     from nonsmooth.system.derived.expressions import SPEED
 
     t, surfaces = (d.traced, d.surfaces) if d.plain is None else d.plain()
-    names = {**d.symbol_names, SPEED: "speed"}
+    names = {**d.traced.named("u.", "p."), SPEED: "speed"}
 
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
+
+    def states(vector: Sequence[sp.Expr], mode: int) -> dict[str, str]:
+        own = zip(t.state_names, vector, t.lacking[mode], strict=True)
+        return {state: text(e) for state, e, gone in own if not gone}
 
     upward = {(s.below, s.above, (TracedCondition(s.indicator, 1),)): s for s in surfaces}
     downward = {(s.above, s.below, (TracedCondition(s.indicator, -1),)) for s in surfaces}
     transitions: list[dict[str, Any]] = []
     for jump in t.transitions:
-        crossing = (jump.source, jump.target, jump.rows)
+        entry: dict[str, Any]
+        crossing, at = (jump.source, jump.target, jump.rows), jump.at
         if crossing in downward:  # the second half of a surface
             continue
         if crossing in upward:
-            transitions.append(_surface_content(upward[crossing], t, names))
-            continue
-        entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
-        if jump.at is None:
-            rows = [(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows]
-            entry["when"] = condition_text(rows)
+            surface = upward[crossing]
+            entry = {
+                "surface": t.indicator_names[surface.indicator],
+                "below": t.mode_names[surface.below],
+                "above": t.mode_names[surface.above],
+                "mode": surface.mode,
+                "static": None if surface.static is None else text(surface.static),
+                "field": None if surface.field is None else states(surface.field, surface.below),
+            }
         else:
-            entry["at"] = float(jump.at) if isinstance(jump.at, int | float) else text(jump.at)
-        if jump.reset is not None:
-            own = t.lacking[jump.target]
-            entry["reset"] = {s: text(e) for s, e, gone in zip(t.state_names, jump.reset, own, strict=True) if not gone}
-        if jump.writes:
-            entry["write"] = {t.memory_names[i]: text(value) for i, value in jump.writes}
-        if jump.contact != (jump.source == 0 or jump.reset is not None):
-            entry["contact"] = jump.contact
-        transitions.append(entry)
-    modes = {}
-    for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
-        modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
-    content: dict[str, Any] = {
-        "format": _FORMAT,
-        "version": _VERSION,
-        "name": d.name,
-        "states": dict(d.states),
-        "scale": dict(d.scale),
-        "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
-        "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
-        "modes": modes,
-        "indicators": dict(zip(t.indicator_names, map(text, t.indicators), strict=True)),
-        "transitions": transitions,
-        "outputs": {
-            k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
-            for k, row in zip(t.output_names, t.outputs, strict=True)
-        },
-    }
-    if d.inputs:
-        content["inputs"] = dict(d.inputs)
-    if d.traced.period is not None:
-        content["period"] = text(d.traced.period)
-    if d.symmetry is not None:
-        content["symmetry"] = {
-            "map": {s: text(e) for s, e in zip(t.state_names, d.symmetry.map, strict=True)},
-            "shift": d.symmetry.shift,
-            "modes": {d.traced.mode_names[i]: d.traced.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
+            rows = [(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows]
+            usual = jump.source == 0 or jump.reset is not None
+            entry = {
+                "source": t.mode_names[jump.source],
+                "target": t.mode_names[jump.target],
+                "when": condition_text(rows) if at is None else None,
+                "at": at if at is None else float(at) if isinstance(at, int | float) else text(at),
+                "reset": None if jump.reset is None else states(jump.reset, jump.target),
+                "write": {t.memory_names[i]: text(value) for i, value in jump.writes} or None,
+                "contact": None if jump.contact == usual else jump.contact,
+            }
+        transitions.append(_known(entry))
+    loads, patterns, symmetry = d.loads, d.traced.patterns, d.symmetry
+    return _known(
+        {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "name": d.name,
+            "states": dict(d.states),
+            "scale": dict(d.scale),
+            "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
+            "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
+            "modes": {
+                mode: states(field, i) for i, (mode, field) in enumerate(zip(t.mode_names, t.fields, strict=True))
+            },
+            "indicators": dict(zip(t.indicator_names, map(text, t.indicators), strict=True)),
+            "transitions": transitions,
+            "outputs": {
+                k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
+                for k, row in zip(t.output_names, t.outputs, strict=True)
+            },
+            "inputs": dict(d.inputs) or None,
+            "period": None if d.traced.period is None else text(d.traced.period),
+            "symmetry": symmetry
+            and {
+                "map": {s: text(e) for s, e in zip(t.state_names, symmetry.map, strict=True)},
+                "shift": symmetry.shift,
+                "modes": {d.traced.mode_names[i]: d.traced.mode_names[j] for i, j in enumerate(symmetry.modes)},
+            },
+            "impacts": "sequential" if patterns is not None and patterns.make.sequential else None,
+            "elements": loads and {load.name: _element_content(load, t.state_names, text) for load in loads.elements},
+            "powers": loads and {name: text(power) for name, power in loads.powers.items()},
+            "energy": loads and loads.energy,
+            "ranges": [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges] or None,
+            "bands": {d.traced.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands} or None,
         }
-    if d.traced.patterns is not None and d.traced.patterns.make.sequential:
-        content["impacts"] = "sequential"
-    if d.loads is not None:
-        content["elements"] = {one.name: _element_content(one, t.state_names, text) for one in d.loads.elements}
-        content["powers"] = {name: text(power) for name, power in d.loads.powers.items()}
-        content["energy"] = d.loads.energy
-    if d.ranges:
-        content["ranges"] = [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges]
-    if d.bands:
-        content["bands"] = {d.traced.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
-    return content
+    )
+
+
+def _known(entry: dict[str, Any]) -> dict[str, Any]:
+    """The entries that are there."""
+    return {key: one for key, one in entry.items() if one is not None}
 
 
 def _element_content(element: Load, states: Sequence[str], text: Callable[[sp.Expr], str]) -> dict[str, Any]:
@@ -151,31 +163,17 @@ def _element_content(element: Load, states: Sequence[str], text: Callable[[sp.Ex
     return {
         "kind": element.kind,
         "given": element.text,
-        "options": dict(element.options),
+        "options": {key: one.item() if isinstance(one, np.generic) else one for key, one in element.options.items()},
         "where": text(element.where),
         "on": {states[i]: text(e) for i, e in element.direction.items() if e != 0},
         "laws": {name: text(law) for name, law in element.laws.items()},
     }
 
 
-def _surface_content(surface: TracedSurface, t: Traced, names: Mapping[sp.Symbol, str]) -> dict[str, Any]:
-    """Return a surface; what was not given is left out."""
-    entry: dict[str, Any] = {
-        "surface": t.indicator_names[surface.indicator],
-        "below": t.mode_names[surface.below],
-        "above": t.mode_names[surface.above],
-        "mode": surface.mode,
-    }
-    if surface.static is not None:
-        entry["static"] = write_expression(surface.static, names)
-    if surface.field is not None:
-        own = zip(t.state_names, surface.field, t.lacking[surface.below], strict=True)
-        entry["field"] = {state: write_expression(e, names) for state, e, gone in own if not gone}
-    return entry
-
-
 def _band_content(band: Any, d: Description) -> dict[str, Any]:
-    names = d.symbol_names | {band.eta: "p.eta"} | {symbol: f"p.{name}" for name, _, symbol, _ in band.memory}
+    names = (
+        d.traced.named("u.", "p.") | {band.eta: "p.eta"} | {symbol: f"p.{name}" for name, _, symbol, _ in band.memory}
+    )
     t = d.traced
     return {
         "field": {s: write_expression(e, names) for s, e in zip(t.state_names, band.field, strict=True)},

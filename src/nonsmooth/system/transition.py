@@ -190,22 +190,8 @@ _SIGN = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>])(=?)\s*0(?:\.0*)?\s*\Z")
 
 
 def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple[tuple[str, int, bool], ...]:
-    """Return (indicator, sign, strict) for each sign of a condition; ``>= 0`` is not strict.
-
-    Parameters
-    ----------
-    text : str
-        For example ``"penetration > 0 and separation < 0"``.
-    indicators : sequence of str
-        Names that may occur.
-    label : str
-        The transition, for the message.
-
-    Raises
-    ------
-    SystemDefinitionError
-        Outside the grammar, an unknown indicator, or the same indicator asked to have both signs.
-    """
+    """Return (indicator, sign, strict) for each sign of a condition such as ``"penetration > 0 and separation < 0"``;
+    ``>= 0`` is not strict. ``label`` names the transition in messages."""
     if not isinstance(text, str):
         raise SystemDefinitionError(f"{label}: `when` must be a string of the form: {GRAMMAR}; not {shortened(text)}")
     signs: dict[str, tuple[int, bool]] = {}

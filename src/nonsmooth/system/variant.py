@@ -183,17 +183,8 @@ Matrix = tuple[Vector, ...]
 
 
 class Derivatives:
-    """Derivatives of a traced system.
-
-    Parameters
-    ----------
-    traced : Traced
-
-    Notes
-    -----
-    ``of`` is one of ``"u"``, ``"t"``, ``"p"``, ``"m"`` (memory): the columns of a Jacobian. All methods
-    take indices and return tuples of SymPy expressions.
-    """
+    """Derivatives of a traced system, by indices, as tuples of SymPy expressions; ``of`` is one of ``"u"``, ``"t"``,
+    ``"p"``, ``"m"`` (memory): the columns of a Jacobian."""
 
     def __init__(self, traced: Traced) -> None:
         self.traced = traced

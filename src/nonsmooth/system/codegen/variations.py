@@ -174,7 +174,7 @@ def _switch(traced: Traced, jump: TracedTransition, wanted: list[sp.Symbol]) -> 
     values += [_derivative(e, s) for e in after for s in p]
     for row in jump.rows:
         h = traced.indicators[row.indicator]
-        values += [h, *(_derivative(h, s) for s in z), _derivative(h, traced.t), *(_derivative(h, s) for s in p)]
+        values += [h, *(_derivative(h, s) for s in (*z, traced.t, *p))]
     return [(f"out[{i}]", e) for i, e in enumerate(values)]
 
 

@@ -45,7 +45,7 @@ class Expressions(Assembler):
     # What the user gave
 
     def _call(self, function: Any, what: str) -> sp.Expr:
-        return call_scalar(function, (Scalar(self.symbols.t), self.symbols.states(), self.symbols.parameters()), what)
+        return call_scalar(function, self.symbols.arguments(), what)
 
     def _given(self, given: Law, what: str) -> sp.Expr:
         """A number, the name of a parameter or of memory, or a function of t, u, p."""

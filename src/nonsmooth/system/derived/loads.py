@@ -128,9 +128,9 @@ def _text(make: Expressions, k: int) -> str:
     given = part.element.given or part.element
     if isinstance(given, str):
         return given
-    names = {make.symbols.t: "t"}
-    for symbols in (make.symbols.u, make.symbols.p, make.symbols.m):
-        names |= {symbol: name for name, symbol in symbols.items()}
+    symbols = make.symbols
+    names = {symbol: name for name, symbol in {**symbols.u, **symbols.p, **symbols.m}.items()}
+    names |= {symbols.t: "t", SPEED: "v"}
 
     def shown(name: str, value: Any) -> str:
         if isinstance(value, Mapping):
@@ -138,7 +138,7 @@ def _text(make: Expressions, k: int) -> str:
         if not callable(value):
             return f'"{value}"' if isinstance(value, str) else str(value)
         expression = make.spoken(k, name) if name in given.laws else make._given(value, name)
-        return write_expression(expression, {**names, SPEED: "v"})
+        return write_expression(expression, names)
 
     parts = [
         f"{one.name}={shown(one.name, getattr(given, one.name))}"

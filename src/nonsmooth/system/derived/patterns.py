@@ -121,15 +121,15 @@ class Patterns:
     @cached_property
     def conditions(self) -> tuple[str, ...]:
         """Names of the conditions of all elements, the indicators of the system."""
-        return tuple(name for names in self._conditions.values() for name in names)
+        return tuple(name for name, _ in self._owned)
 
     @cached_property
-    def _conditions(self) -> dict[int, list[str]]:
-        """The names of the conditions of each element."""
-        make, found = self.make, {}
+    def _owned(self) -> list[tuple[str, int]]:
+        """The names of all conditions, each with its element."""
+        make, found = self.make, []
         for k, (name, element) in enumerate(self.elements.items()):
             thrown = THROWN if element.held and make.driven(make.rate(k, self.mode)) else ()
-            found[k] = [f"{name}_{one}" for one in (*element.conditions, *thrown)]
+            found += [(f"{name}_{one}", k) for one in (*element.conditions, *thrown)]
         return found
 
     @cached_property
@@ -140,7 +140,7 @@ class Patterns:
     @cached_property
     def owners(self) -> list[int]:
         """The element of each condition."""
-        return [k for k, names in self._conditions.items() for _ in names]
+        return [k for _, k in self._owned]
 
     def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], Conditions]:
         """The ways of an element out of its phase in a pattern, the rows of its conditions by their numbers, and the

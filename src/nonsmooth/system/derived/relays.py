@@ -74,7 +74,7 @@ def relays_of(symbols: Symbols, given: Mapping[str, Any], values: Mapping[sp.Sym
     signs = _signs(keys, modes, transitions)
     if signs is None or any(key not in where for key in keys):
         return None
-    arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
+    arguments = symbols.arguments()
     u = tuple(symbols.u.values())
     fields = {
         sides: call_vector(modes[mode].field, arguments, tuple(symbols.u), f"the vector field of mode {mode!r}")

@@ -51,20 +51,8 @@ Field = tuple[sp.Expr, ...]
 
 
 def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str, float]) -> Traced:
-    """Return the system with its sliding modes and, at each surface, the transitions between below, above and sliding.
-
-    Parameters
-    ----------
-    traced : Traced
-        With two plain transitions for each surface, one each way; they are replaced.
-    surfaces : sequence of TracedSurface
-    scale : mapping of state to float
-
-    Raises
-    ------
-    SystemDefinitionError
-        A transition that the two modes of a surface have with different resets or targets.
-    """
+    """Return the system with its sliding modes and, at each surface, the transitions between below, above and sliding,
+    in place of the two plain ones, one each way."""
     build = _SlidingModes(traced, scale)
     pairs, level = list(surfaces), list(surfaces)
     while level:
@@ -87,14 +75,8 @@ def _both_rates(traced: Traced, surface: TracedSurface, scale: tuple[float, ...]
 
 
 def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
-    """Return the surface on which a start lies where both fields point away from it, and which start; else None.
-
-    Parameters
-    ----------
-    system : System
-    states : array (S, n)
-        Starts at t = 0.
-    """
+    """Return the surface on which one of the starts (S, n) lies at t = 0, both fields pointing away from it, and which
+    start; else None."""
     traced, scale = system.declared, tuple(system.scale.values())
     for surface in system.surfaces:
         both = _both_rates(traced, surface, scale)

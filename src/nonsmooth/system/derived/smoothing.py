@@ -268,21 +268,8 @@ class _Bands(Additions):
 
 
 def smooth(description: Description, single: bool, shape: str = "linear") -> Smoothed:
-    """Derive the smoothed system.
-
-    Parameters
-    ----------
-    description : Description
-    single : bool
-        One half width ``eta`` for all indicators; else one for each, ``eta_<indicator>``.
-    shape : str
-        One of `BANDS`.
-
-    Raises
-    ------
-    SystemDefinitionError
-        Transitions with a reset, at a time, without a way back, or bands that overlap: the pair is named.
-    """
+    """Derive the smoothed system, with a ``single`` half width ``eta`` for all indicators or one for each,
+    ``eta_<indicator>``, and a ``shape`` of `BANDS`; what cannot be smoothed is refused, the pair of modes named."""
     old, apart = without_sticking(description.traced)
     pairs = _pairs(old)
     wanted = list(dict.fromkeys(old.indicator_names[row.indicator] for pair in pairs for row in pair.rows))

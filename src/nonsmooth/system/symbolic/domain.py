@@ -41,16 +41,8 @@ def timed_expressions(traced: Traced) -> dict[str, sp.Expr]:
 
 
 def forcing_period(expressions: Sequence[sp.Expr], t: sp.Symbol, values: Mapping[sp.Symbol, float]) -> sp.Expr | None:
-    """Return the common period in the parameters, positive at their values, or None where there is none to be read off.
-
-    Parameters
-    ----------
-    expressions : sequence of Expr
-        All that may depend on time.
-    t : Symbol
-    values : mapping of Symbol to float
-        Those of the parameters, on which a frequency may depend.
-    """
+    """Return the common period of expressions in the parameters, positive at their ``values``, or None where there is
+    none to be read off."""
     frequencies: list[sp.Expr] = []
     for expression in expressions:
         if not _collect(expression, t, values, frequencies):
@@ -96,19 +88,8 @@ def _collect(e: sp.Expr, t: sp.Symbol, values: Mapping[sp.Symbol, float], found:
 def check_period(
     expressions: Mapping[str, sp.Expr], t: sp.Symbol, others: Mapping[sp.Symbol, float], period: float, given: str
 ) -> None:
-    """Raise unless every expression repeats after ``period`` (numerically, at fixed pseudo-random points).
-
-    Parameters
-    ----------
-    expressions : mapping of str to Expr
-        What each is, and its expression.
-    t : Symbol
-    others : mapping of Symbol to float
-        Values of the parameters; states and memory are drawn at random.
-    period : float
-    given : str
-        What the user gave, for the message.
-    """
+    """Raise unless every expression, by what it is, repeats after the ``period`` that was ``given``: numerically, at
+    the parameters ``others`` and fixed pseudo-random states and memory."""
     random = np.random.default_rng(5)
     for what, expression in expressions.items():
         if t not in expression.free_symbols:
@@ -178,14 +159,8 @@ class _Rule:
 
 
 class Domain:
-    """The conditions on the parameters of a traced system.
-
-    Parameters
-    ----------
-    traced : Traced
-    apart : iterable of (expression, message), optional
-        Further expressions of the parameters that must not be negative.
-    """
+    """The conditions on the parameters of a traced system; ``apart`` are further expressions of them that must not be
+    negative, each with its message."""
 
     def __init__(self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = ()) -> None:
         self._names = traced.parameter_names
@@ -213,14 +188,8 @@ class Domain:
         self._rules += [_Rule(expression, "apart", message, traced) for expression, message in apart]
 
     def check(self, values: Mapping[str, float], changed: Collection[str] | None = None) -> None:
-        """Raise SystemDefinitionError where ``values`` are not allowed.
-
-        Parameters
-        ----------
-        values : mapping of name to float
-        changed : collection of str, optional
-            Only what depends on these has to be looked at.
-        """
+        """Raise SystemDefinitionError where ``values`` are not allowed; only what depends on those that ``changed`` has
+        to be looked at."""
         for name in values if changed is None else changed:
             if name in self._zero and values[name] == 0:
                 raise SystemDefinitionError(self._by_zero(name))

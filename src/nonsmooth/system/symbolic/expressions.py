@@ -123,19 +123,8 @@ def _write_product(e: Any, inside: Callable[[Any, int], str]) -> tuple[str, int]
 
 
 def read_expression(text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
-    """Return the expression of `write_expression`'s text; nothing is executed.
-
-    Parameters
-    ----------
-    text : str
-    symbols : mapping of str to Symbol
-        What ``t``, ``u.x``, ``p.k`` stand for.
-
-    Raises
-    ------
-    ValueError
-        Anything but numbers, the known names, arithmetic, comparisons and the known functions.
-    """
+    """Return the expression of `write_expression`'s text, ``symbols`` being those of ``t``, ``u.x``, ``p.k``; nothing
+    is executed. Anything but numbers, these names, arithmetic, comparisons, the known functions is a ValueError."""
     if not isinstance(text, str):
         raise ValueError(f"an expression must be a string, not {shortened(text)}")
     if len(text) > _LONGEST:

@@ -60,15 +60,8 @@ RELATIONS: dict[type, str] = {
 
 
 class Printer:
-    """Text of an expression whose symbols (and named subexpressions) are called as in ``names``.
-
-    Parameters
-    ----------
-    names
-        Expression -> identifier. A mapping that grows while :func:`assignments` names subexpressions.
-    arrays
-        Write NumPy code that works elementwise instead of scalar code with functions of ``math``.
-    """
+    """Text of an expression whose symbols and subexpressions are called as in ``names``, which grow while
+    :func:`assignments` names some: scalar code with functions of ``math``, or code of NumPy for ``arrays``."""
 
     def __init__(self, names: Mapping[Basic, str], arrays: bool = False) -> None:
         self.names: dict[Basic, str] = dict(names)

@@ -163,11 +163,6 @@ class Traced:
         """Return whether motion in a mode slides along the surface of an indicator."""
         return mode < len(self.along) and indicator in self.along[mode]
 
-    def is_idle(self, mode: int, indicator: int) -> bool:
-        """Return whether an indicator is a condition of elements that is not asked for in a mode: it is not computed
-        there."""
-        return self.decider is not None and indicator in self.decider.idle[mode]
-
     def phase_text(self, jump: TracedTransition) -> str:
         """The phase of a transition as it was written."""
         if isinstance(jump.at, int | float):

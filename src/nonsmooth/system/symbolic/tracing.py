@@ -18,16 +18,9 @@ _LARGEST = sp.Integer(int(sys.float_info.max))
 
 
 class Symbols:
-    """The symbols of a system; prefixes keep a parameter called ``lambda`` or ``t`` from clashing.
+    """The symbols of a system, by names with units; prefixes keep a parameter called ``lambda`` or ``t`` from clashing.
 
-    Parameters
-    ----------
-    name : str
-        The system's name, for messages.
-    states, parameters, memory : mapping of name to unit
-    inputs : sequence of str
-        The states that stand for inputs: functions read them among the parameters.
-    """
+    ``inputs`` are the states that stand for inputs: functions read them among the parameters."""
 
     def __init__(
         self,
@@ -62,6 +55,12 @@ class Symbols:
         chosen = {name: self.u[name] for name in (self.u if names is None else names) if name not in self.inputs}
         units = {name: self.units[name] for name in chosen}
         return States({name: Scalar(symbol) for name, symbol in chosen.items()}, units, owner or repr(self.name))
+
+    def arguments(
+        self, own: Sequence[str] | None = None, owner: str | None = None
+    ) -> tuple[Scalar, States, Parameters]:
+        """The arguments (t, u, p) of a function of a mode, which has all states or its ``own``."""
+        return Scalar(self.t), self.states(own, owner), self.parameters()
 
     def parameters(self, extra: Mapping[str, sp.Symbol] | None = None) -> Parameters:
         """The parameters as a function sees them: parameters, memory, inputs and ``extra`` symbols by name."""
@@ -153,16 +152,7 @@ class KnownFunction:
 def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: Sequence[str], what: str) -> tuple:
     """Call a user's function and return one expression per name; what it returns is in their order or a mapping.
 
-    Parameters
-    ----------
-    function : callable
-    arguments : sequence
-        What it is called with, usually (t, u, p).
-    names : sequence of str
-        What the entries of its result are.
-    what : str
-        Which function this is, for messages: "the vector field of mode 'free'".
-    """
+    ``what`` says in messages which function it is: "the vector field of mode 'free'"."""
     result = call(function, arguments, what)
     if isinstance(result, Scalar) or np.isscalar(result):
         result = (result,)

@@ -229,14 +229,10 @@ class Place:
         pattern = (*self.pattern[: self.k], self.element.phases.index(phase), *self.pattern[self.k + 1 :])
         return Place(self.make, self.k, self.mode, pattern)
 
-    def other(self, j: int) -> Place:
-        """The place of another element in the same combination."""
-        return Place(self.make, j, self.mode, self.pattern)
-
     def named(self, name: Any) -> Place | None:
         """That of an element by its name; None where there is none."""
         found = [j for j, part in enumerate(self.make.parts) if part.name == name]
-        return self.other(found[0]) if found else None
+        return self.make.place(found[0], self.mode, self.pattern) if found else None
 
     def holding(self) -> Any:
         """The force of the element."""
