@@ -34,16 +34,15 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
     apart = [needed for (mode, h), ends in sticks.items() for needed in _equal_friction(traced, mode, h, ends)]
     between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & dropped}
     left = [jump for jump in traced.transitions if not {jump.source, jump.target} & dropped]
-    joined = {end for ends in sticks.values() for end in ends.values()} - dropped
-    while (
-        more := {end for jump in left if {jump.source, jump.target} & joined for end in (jump.source, jump.target)}
-        - joined
-    ):
-        joined |= more
-    kept = sorted(joined)  # where two stick at once, a question led there and back
+    joined = [{mode} for mode in range(len(traced.mode_names)) if mode not in dropped]
+    for ends in ({jump.source, jump.target} for jump in left):
+        joined = [one for one in joined if not one & ends] + [set.union(*(one for one in joined if one & ends))]
+    # Where two stick at once, a question led there and back: other surfaces alone are left to stick to.
+    freed = [len({h for (_, h), ends in sticks.items() if one & {*ends.values()}}) for one in joined]
+    kept = sorted(set.union(*(one for one, own in zip(joined, freed, strict=True) if own == max(freed))))
     jumps: dict[tuple[int, int, tuple[TracedCondition, ...]], TracedTransition] = {}
     for jump in left:
-        if jump.source not in joined:
+        if jump.source not in kept:
             continue
         rows, h = jump.rows, between.get(frozenset((jump.source, jump.target)))
         if h is not None and jump.reset is None:
