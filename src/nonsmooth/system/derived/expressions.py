@@ -18,7 +18,7 @@ from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.derived.faces import INDEPENDENT
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.symbolic.traced import along
-from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
+from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, one_number
 
 OTHER = 8  # draws from here on have other parameters too
 SPEED = sp.Symbol("speed_", real=True)  # in a law of it
@@ -54,7 +54,7 @@ class Expressions(Assembler):
             if given not in known:
                 raise SystemDefinitionError(f"{what}: {unknown(given, 'a parameter', 'this system', list(known))}")
             return known[given]
-        return self._call(given if callable(given) else (lambda t, u, p: given), what)
+        return self._call(given, what) if callable(given) else one_number(given, what)
 
     def _part(self, name: str, element: Element) -> Part:
         what, names = f"element {name!r}", list(self.symbols.u)

@@ -173,7 +173,11 @@ def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: S
 
 def call_scalar(function: Callable[..., Any], arguments: Sequence[Any], what: str) -> sp.Expr:
     """Call a user's function and return the one expression it gives."""
-    result = call(function, arguments, what)
+    return one_number(call(function, arguments, what), what)
+
+
+def one_number(result: Any, what: str) -> sp.Expr:
+    """The expression of a number, given or returned by a user's function."""
     if isinstance(result, (tuple, list, States)) or (isinstance(result, np.ndarray) and result.ndim):
         if len(result) != 1:
             raise SystemDefinitionError(f"{what} must return one number; it returned {len(result)} values")

@@ -40,7 +40,7 @@ class Friction(Element):
         return int(np.sign(rate))
 
     def meeting(self, here: Place) -> list[list[Condition]]:
-        return [[Condition(here.where, -1 if here.phase == "forward" else 1, "speed")]]
+        return [[Condition(here.where, -here.side, "speed")]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ class Coulomb(Friction):
         return rows
 
     def force(self, here: Place) -> Any:
-        side = 1 if here.phase == "forward" else -1
+        side = here.side
         return -side * here.law("friction", side) * self.pressure(here)
 
     def pressure(self, here: Place) -> Any:
@@ -130,6 +130,7 @@ class Coulomb(Friction):
     def leaving(self, here: Place) -> list[Leaving]:
         v, hold, most = here.where, here.put("stick").holding(), self.most(here)
         over, under = hold - most, hold + most
+        torn_back, torn_forward = Condition(over, 1, "over"), Condition(under, -1, "under")
         if here.phase == "stick":
             off = SMALL * here.size(v)
             begins = (
@@ -140,14 +141,12 @@ class Coulomb(Friction):
                 if here.begins_alone()
                 else []
             )
-            ends = Condition(over, 1, "over"), Condition(under, -1, "under")
-            return [*begins, Leaving("back", [ends[0]]), Leaving("forward", [ends[1]])]
-        other, sign = ("back", -1) if here.phase == "forward" else ("forward", 1)
+            return [*begins, Leaving("back", [torn_back]), Leaving("forward", [torn_forward])]
+        other, sign, torn = ("back", -1, torn_back) if here.side > 0 else ("forward", 1, torn_forward)
         stopped = Condition(v, sign, "speed")
         if here.vanishes(most):
             return [Leaving(other, [stopped])]  # an open contact, which bears no friction
         within = [Condition(over, -1, "over"), Condition(under, 1, "under")]
-        torn = Condition(over, 1, "over") if here.phase == "forward" else Condition(under, -1, "under")
         still = here.struck(0)
         tie = Leaving("stick", [stopped], still)  # a load as large as the friction, to all orders: it holds
         if not here.is_turned():

@@ -203,7 +203,7 @@ class Place:
 
     @property
     def side(self) -> int:
-        """1 where it slips forward, -1 back, else 0."""
+        """1 where it is in the first of its ``sides``, -1 in the second, else 0."""
         sides = self.element.sides
         return (self.phase == sides[0]) - (self.phase == sides[1])
 
