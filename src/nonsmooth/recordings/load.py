@@ -19,14 +19,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
-from nonsmooth.recordings.reading import (
-    MAX_FILE_BYTES,
-    Options,
-    Reading,
-    Trace,
-    inflation_limit,
-    names_of,
-)
+from nonsmooth.recordings.reading import MAX_FILE_BYTES, Options, Reading, inflation_limit, names_of
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.system.arguments import checked
 
@@ -131,8 +124,7 @@ def load_recording(path: str | os.PathLike[str], *, format: str | None = None, *
     recording = parse_recording(content_of(file), file.name, asked, format=format)
     for remark in recording.warnings[:_SPOKEN]:
         warnings.warn(f"{file.name}: {remark}", RecordingWarning, stacklevel=3)
-    if len(recording.warnings) > _SPOKEN:
-        more = len(recording.warnings) - _SPOKEN
+    if (more := len(recording.warnings) - _SPOKEN) > 0:
         warnings.warn(f"{file.name}: {more} more; see Recording.warnings", RecordingWarning, stacklevel=3)
     return recording
 
@@ -202,12 +194,13 @@ def _detect(data: bytes, reading: Reading) -> str:
     if re.match(rb"\s*-1\s*\n\s+\d+", data[:200]):
         return "uff"
     if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        hint = "a .mat file of version 4 is not read: save it again with -v7" if reading.name.endswith(".mat") else ""
-        known = (
+        hint = " (a .mat file of version 4 is not read: save it again with -v7)"
+        raise reading.error(
+            "",
             "is none of the formats known: Capstone .csv and .cap, tables, .xlsx, LabVIEW .lvm and .tdms, MATLAB .mat, "
             "HDF5, .npy and .npz, Parquet and Feather, .wav, universal files, .mf4; give format= if it is one of them"
+            + (hint if reading.name.endswith(".mat") else ""),
         )
-        raise reading.error("", known + (f" ({hint})" if hint else ""))
     from nonsmooth.recordings.readers.capstone_csv import looks_like_capstone
 
     plain = reading.columns is not None or reading.rate is not None or reading.axis != "time"
@@ -216,16 +209,11 @@ def _detect(data: bytes, reading: Reading) -> str:
 
 def _replace_units(reading: Reading) -> None:
     names, units = {trace.name for trace in reading.traces}, reading.units or {}
-    for name in set(reading.wraps or {}) - names - {reading.axis}:
-        raise reading.error("", f"wraps names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
     quantities = {trace.attrs.get("measurement", trace.name) for trace in reading.traces}
-    for name in units:
-        if name not in names | quantities | {reading.axis}:
-            raise reading.error("", f"units names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
-
-    def unit(trace: Trace) -> str:
-        given = units.get(trace.name, units.get(trace.attrs.get("measurement", "")))
-        return trace.unit if given is None else given
-
+    for option, allowed in (("wraps", names), ("units", names | quantities)):
+        for name in (getattr(reading, option) or {}).keys() - allowed - {reading.axis}:
+            there = names_of(sorted(names))
+            raise reading.error("", f"{option} names {name!r}, which is no channel; there are: {there}")
     if units:
-        reading.traces = [replace(trace, unit=unit(trace)) for trace in reading.traces]
+        of = [units.get(one.name, units.get(one.attrs.get("measurement", ""), one.unit)) for one in reading.traces]
+        reading.traces = [replace(trace, unit=unit) for trace, unit in zip(reading.traces, of, strict=True)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -162,6 +163,19 @@ def check_parameter(name: str, system: System) -> None:
     if name not in system.parameters:
         units = {key: item.unit for key, item in system.parameters.items()}
         raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+
+
+def intervals(name: str, over: str, drawn: Any, unit: str, level: float) -> dict[str, Any]:
+    """Ends of the intervals of drawn values (draws, n), NaN where fewer than half of the draws have one."""
+    if not len(drawn):
+        return {}
+    table = np.array(drawn, float)
+    table[:, np.isfinite(table).sum(axis=0) * 2 < len(table)] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        both = np.nanquantile(table, [(1 - level) / 2, (1 + level) / 2], axis=0).reshape(2, -1)
+    rows, said = dict(zip(("low", "high"), both, strict=True)), "end of the interval for drawn parameters"
+    return {f"{name}_{end}": labelled(over, row, f"{end} {said}", unit) for end, row in rows.items()}
 
 
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:
