@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,7 +10,7 @@ import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.attractors.basins_matching import CLOSE
-from nonsmooth.identification.compare.draws import drawn_variables
+from nonsmooth.identification.compare.draws import drawn_variables, quantiles
 from nonsmooth.identification.compare.response import nearest_alike
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
@@ -92,9 +91,7 @@ class Gathered:
     def _of(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
         array = self.centre[name]
         if name.rpartition("_")[2] == "stable" or array.dtype.kind == "b":
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)  # no draw has this point
-                mean = np.nanmean(np.asarray(stack, float), axis=0)
+            mean = xr.DataArray(np.asarray(stack, float)).mean("dim_0").values  # NaN where no draw has this point
             return {f"{name}_probability": labelled(array.dims, mean, f"share of draws: {name}")}
         if name == "period_number":
             every = np.append(stack, array.values)
@@ -112,11 +109,8 @@ class Gathered:
 
     def _numbers(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
         array = self.centre[name]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # no draw has a value here
-            bands = np.nanquantile(stack, edges, axis=0)
         attrs = {key: value for key, value in array.attrs.items() if isinstance(value, str)}
-        found = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
+        found = {f"{name}_quantiles": (("quantile", *array.dims), quantiles(stack, edges), attrs)}
         share = np.isfinite(stack).sum(axis=0) / len(self.rows)
         if (share < 1).any():
             found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")

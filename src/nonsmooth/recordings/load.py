@@ -9,7 +9,6 @@ import os
 import re
 import stat
 import warnings
-import zlib
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -19,7 +18,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
-from nonsmooth.recordings.reading import MAX_FILE_BYTES, Options, Reading, inflation_limit, names_of
+from nonsmooth.recordings.reading import MAX_FILE_BYTES, Options, Reading, inflation_limit, names_of, readable
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.system.arguments import checked
 
@@ -147,11 +146,8 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
 def _unpacked(data: bytes, reading: Reading) -> bytes:
     """The content of a file that gzip has packed."""
     limit = inflation_limit(len(data))
-    try:
-        with gzip.open(io.BytesIO(data)) as packed:
-            content = packed.read(limit + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise reading.error("", f"cannot be unpacked, it is damaged or cut short ({error})") from error
+    with readable("unpacked", reading), gzip.open(io.BytesIO(data)) as packed:
+        content = packed.read(limit + 1)
     if len(content) > limit:
         raise reading.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
     return content

@@ -8,7 +8,7 @@ from typing import Any, Literal, Unpack
 import numpy as np
 import xarray as xr
 
-from nonsmooth.errors import unknown
+from nonsmooth.errors import check_keys
 from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
@@ -241,9 +241,7 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
             f"noise={{{', '.join(map(repr, states))}: ...}}, or `u_error` or `section_error` in the measured Dataset"
         )
     if isinstance(noise, Mapping):
-        for name in noise:
-            if name not in states:
-                raise ValueError(unknown(name, "a state", "this measurement", states))
+        check_keys(noise, states, "noise", "a state", "this measurement")
         if missing := [name for name in states if name not in noise]:
             raise ValueError(f"noise is not given for {', '.join(missing)}")
         noise = [noise[name] for name in states]

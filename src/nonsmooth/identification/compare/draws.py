@@ -165,15 +165,20 @@ def check_parameter(name: str, system: System) -> None:
         raise ValueError(unknown(name, "a parameter", repr(system.name), units))
 
 
+def quantiles(draws: Any, edges: Any) -> np.ndarray:
+    """Quantiles over draws; NaN, which tells nothing, is passed over."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # no draw has a value here
+        return np.nanquantile(np.asarray(draws, float), edges, axis=0)
+
+
 def intervals(name: str, over: str, drawn: Any, unit: str, level: float) -> dict[str, Any]:
     """Ends of the intervals of drawn values (draws, n), NaN where fewer than half of the draws have one."""
     if not len(drawn):
         return {}
     table = np.array(drawn, float)
     table[:, np.isfinite(table).sum(axis=0) * 2 < len(table)] = np.nan
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        both = np.nanquantile(table, [(1 - level) / 2, (1 + level) / 2], axis=0).reshape(2, -1)
+    both = quantiles(table, [(1 - level) / 2, (1 + level) / 2]).reshape(2, -1)
     rows, said = dict(zip(("low", "high"), both, strict=True)), "end of the interval for drawn parameters"
     return {f"{name}_{end}": labelled(over, row, f"{end} {said}", unit) for end, row in rows.items()}
 
@@ -252,4 +257,4 @@ class Model:
     def band(self, stack: Any) -> dict[str, np.ndarray]:
         """Low, median and high of the band of draws; NaN, which tells nothing, is passed over."""
         edges = (1 - self.level) / 2, 0.5, (1 + self.level) / 2
-        return dict(zip(("low", "median", "high"), np.nanquantile(np.stack(stack), edges, axis=0), strict=True))
+        return dict(zip(("low", "median", "high"), quantiles(stack, edges), strict=True))

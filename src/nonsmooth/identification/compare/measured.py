@@ -230,9 +230,17 @@ def measured_motion(
     # Beyond the first and last turn the phase would be a guess.
     inside = (time >= turns[0]) & (time <= turns[-1])
     phase = (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi)
+    source = recording.source
+    attrs = {
+        "synthetic": "yes" if recording.synthetic else "no",
+        "title": f"{source.get('file') or 'in memory'}, {name}",
+        "run": name,
+        "file": str(source.get("file", "")),
+        "sha256": str(source.get("sha256", "")),
+    }
     return (
         _motion(smoothed.isel(time=inside), phase)
-        .assign_attrs(_attributes(recording, name))
+        .assign_attrs(attrs)
         .assign_coords(
             omega=labelled((), drive.omega, "frequency of the drive", "rad/s"),
             omega_error=labelled((), drive.omega_error, "standard error of it", "rad/s"),
@@ -269,14 +277,3 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     first = smooth(time, x, resolution=step, intensity=rough)
     levels = (quiet["intensity"], quiet["intensity_in_contact"])
     return smooth(time, x, resolution=step, contacts=intervals(first, gap)[:2], intensity=levels)
-
-
-def _attributes(recording: Recording, run: str) -> dict[str, str]:
-    source = recording.source
-    return {
-        "synthetic": "yes" if recording.synthetic else "no",
-        "title": f"{source.get('file') or 'in memory'}, {run}",
-        "run": run,
-        "file": str(source.get("file", "")),
-        "sha256": str(source.get("sha256", "")),
-    }

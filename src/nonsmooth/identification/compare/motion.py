@@ -107,17 +107,14 @@ def _clouds(
         "theory_section": labelled((at, "theory_iterate", "state"), np.stack(exact), "predicted section points"),
         "section_scale": labelled("state", scale, "unit of each state in the distances of clouds"),
     }
+    pairs = list(zip(sections, blurred, strict=True))
+    scaled = [(a / scale, b / scale) for a, b in pairs]
     found = [
-        cloud_distance(a / scale, b / scale, splits=model.splits, seed=model.seed)
-        if min(len(a), len(b)) >= 2 * FEWEST_BLOCKS
-        else None
-        for a, b in zip(sections, blurred, strict=True)
+        cloud_distance(a, b, splits=model.splits, seed=model.seed) if min(len(a), len(b)) >= 2 * FEWEST_BLOCKS else None
+        for a, b in scaled
     ]
-    moved = [
-        [wasserstein_distance(a[:, i], b[:, i]) for i in range(len(scale))]
-        for a, b in zip(sections, blurred, strict=True)
-    ]
-    both = [wasserstein(a / scale, b / scale, model.seed) for a, b in zip(sections, blurred, strict=True)]
+    moved = [[wasserstein_distance(*column) for column in zip(a.T, b.T, strict=True)] for a, b in pairs]
+    both = [wasserstein(a, b, model.seed) for a, b in scaled]
     variables["wasserstein_distance"] = labelled(
         (at, "state"), np.array(moved), "Wasserstein distance of the section clouds, in the state's unit"
     )

@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.arrays import FloatArray, IntArray
 
 BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period is lost
 FEWEST_RETURNS = 4
@@ -96,12 +96,8 @@ def period_numbers(points: ArrayLike, noise: ArrayLike, *, window: int = 24, max
     if len(cloud) < window:
         raise ValueError(f"{len(cloud)} section points are fewer than one window of {window}")
     count = len(cloud) - window + 1
-    numbers = np.array(
-        [
-            measured_period(cloud[i : i + window], noise, max_period=max_period, drifting=True).number
-            for i in range(count)
-        ]
-    )
+    parts = (cloud[i : i + window] for i in range(count))
+    numbers = [measured_period(part, noise, max_period=max_period, drifting=True).number for part in parts]
     return np.pad(numbers, (window // 2, window - 1 - window // 2), mode="edge").astype(np.int64)
 
 
@@ -125,21 +121,17 @@ def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
     x, n = np.asarray(values, float)[order], np.asarray(numbers)[order]
     found = {}
     for p in (1, 2):
-        is_single, is_double = n == p, n == 2 * p
-        if is_single.any() and is_double.any():
-            found[f"{p}-{2 * p}"] = _parting(x, is_single, is_double)
+        single, double = n == p, n == 2 * p
+        if not (single.any() and double.any()):
+            continue
+        below = double.sum() + np.concatenate([[0], np.cumsum(single.astype(int) - double)])
+        above = single.sum() + double.sum() - below
+        # `below`: misplaced points if doubles lie below the cut and singles above it; `above` the other way round.
+        wrong = below if below.min() <= above.min() else above
+        best = np.flatnonzero(wrong == wrong.min())  # a tie is cut in its middle
+        edges = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
+        found[f"{p}-{2 * p}"] = float(0.5 * (edges[best[0]] + edges[best[-1]]))
     return found
-
-
-def _parting(x: FloatArray, single: BoolArray, double: BoolArray) -> float:
-    """The value with the fewest singles on the doubles' side and the other way round; in the middle of a tie."""
-    below = double.sum() + np.concatenate([[0], np.cumsum(single.astype(int) - double)])
-    above = single.sum() + double.sum() - below
-    # `below`: misplaced points if doubles lie below the cut and singles above it; `above` the other way round.
-    wrong = below if below.min() <= above.min() else above
-    best = np.flatnonzero(wrong == wrong.min())
-    edges = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
-    return float(0.5 * (edges[best[0]] + edges[best[-1]]))
 
 
 FEWEST = 12  # points with a splitting that can be seen

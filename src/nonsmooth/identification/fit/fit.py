@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Unpack
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError, unknown
+from nonsmooth.errors import SolveError, check_keys
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.fit.beginnings import beginnings, drawn
@@ -153,9 +153,7 @@ def fit(
     problem = problem_of(system, recording, parameters, options, mode, loss, per_run, inputs)
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
     begin = _begun(problem, start, free, leave_out)
-    for name in profile:
-        if name not in problem.unknowns.names:
-            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
+    check_keys(profile, problem.unknowns.names, "profile", "an unknown", "this fit")
     best, left = best_of(problem, begin, free, window or np.inf, tries, seed, progress), list[str]()
     if leave_out:
         problem, left = without_disagreeing(problem, best.theta)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import shortened, unknown
+from nonsmooth.errors import check_keys, shortened, unknown
 from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_steady
@@ -104,10 +104,7 @@ def read_records(
     for label, table in tables.items():
         columns = []
         for quantity, sensor in sensors.items():
-            if sensor.channel not in table:
-                raise ValueError(
-                    f"measured[{quantity!r}]: {unknown(sensor.channel, 'a channel', f'run {label!r}', list(table))}"
-                )
+            check_keys([sensor.channel], table, f"measured[{quantity!r}]", "a channel", f"run {label!r}")
             columns.append(table[sensor.channel])
         records.append(replace(_joined(label, columns, per_run[label]), drive=_driven(system, inputs, label, table)))
     for c, (quantity, sensor) in enumerate(sensors.items()):
@@ -147,8 +144,7 @@ def _driven(
     for name, one in inputs.items():
         one = Input(one) if isinstance(one, str) else one
         if isinstance(one, Input) and isinstance(one.time, str):
-            if one.time not in table:
-                raise ValueError(f"inputs[{name!r}]: {unknown(one.time, 'a channel', f'run {label!r}', list(table))}")
+            check_keys([one.time], table, f"inputs[{name!r}]", "a channel", f"run {label!r}")
             one = replace(one, time=table[one.time][0], values=table[one.time][1])
         found[name] = one
     return driven(system, found)
@@ -177,9 +173,8 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
     if isinstance(one, Recording):
         wanted = one.runs if runs is None else [runs] if isinstance(runs, str) else runs
         found: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
+        check_keys(wanted, one.runs, "runs", "a run", "this recording")
         for run in wanted:
-            if run not in one.runs:
-                raise ValueError(f"runs: {unknown(run, 'a run', 'this recording', list(one.runs))}")
             found[run] = {}
             for leaf in one.tree.children[run].children.values():
                 for name, array in leaf.to_dataset().data_vars.items():
@@ -255,9 +250,8 @@ def _settings(system: System, settings: Any, labels: list[str]) -> dict[str, dic
     if not all(isinstance(one, Mapping) for one in settings.values()):
         settings = dict.fromkeys(labels, settings)
     units = {key: parameter.unit for key, parameter in system.parameters.items()}
-    for label, own in settings.items():
-        if label not in labels:
-            raise ValueError(f"settings: {unknown(label, 'a run', 'this recording', labels)}")
+    check_keys(settings, labels, "settings", "a run", "this recording")
+    for own in settings.values():
         for name in own:
             if name not in system.values:
                 raise ValueError(f"settings: {unknown(name, 'a parameter', repr(system.name), units)}")

@@ -12,7 +12,7 @@ entity) is refused.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers import expat
@@ -45,28 +45,15 @@ def read(data: bytes, reading: Reading) -> None:
     for run, name in experiment.empty:
         reading.of(f"Run #{run}", name, "has no stored values (it may be calculated); left out")
     comma = experiment.header.get("DecimalSeparator", ".") == ","
-    traces = []
-    for group in _groups(experiment, reading):
-        trace = _trace(group, archive, comma, experiment.units, reading)
-        if trace is not None:
-            traces.append(trace)
-    order = sorted(dict.fromkeys(trace.run for trace in traces), key=lambda run: int(run.removeprefix("Run #")))
-    reading.traces = [trace for run in order for trace in traces if trace.run == run]
-
-
-def _groups(experiment: Experiment, reading: Reading) -> Iterator[list[Segment]]:
-    """The blocks of one measurement in one run, together."""
-    groups: dict[int, list[Segment]] = {}
+    groups: dict[int, list[Segment]] = {}  # the blocks of one measurement in one run, together
     for segment in experiment.segments:
         if segment.deleted:
-            reading.of(_run(segment), segment.measurement, "deleted by the user in Capstone; left out")
-            continue
-        groups.setdefault(segment.data_set, []).append(segment)
-    return iter(groups.values())
-
-
-def _run(segment: Segment) -> str:
-    return f"Run #{segment.run}"
+            reading.of(f"Run #{segment.run}", segment.measurement, "deleted by the user in Capstone; left out")
+        else:
+            groups.setdefault(segment.data_set, []).append(segment)
+    traces = [_trace(group, archive, comma, experiment.units, reading) for group in groups.values()]
+    found = [trace for trace in traces if trace is not None]
+    reading.traces = sorted(found, key=lambda trace: int(trace.run.removeprefix("Run #")))
 
 
 def _trace(
@@ -76,17 +63,17 @@ def _trace(
     place = f"main.xml, line {first.line}"
     if not (first.run.isascii() and first.run.isdigit() and len(first.run) < 10):
         raise reading.error(place, f"DataGroupNumber is {first.run[:40]!r}, expected the number of a run")
-    run, name = _run(first), first.measurement
+    run, name = f"Run #{first.run}", first.measurement
     times, values = [], []
     for segment in group:
-        stretch = _stretch(segment, archive, comma, reading)
-        if stretch is None:
+        found = _stretch(segment, archive, comma, reading)
+        if found is None:
             reading.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
             continue
-        times.append(stretch[0])
-        values.append(stretch[1])
-        if stretch[2]:
-            reading.of(run, name, f"{stretch[2]} records between valid ones are marked invalid; they are NaN")
+        times.append(found[0])
+        values.append(found[1])
+        if blank := len(found[1]) - int(segment.size):
+            reading.of(run, name, f"{blank} records between valid ones are marked invalid; they are NaN")
     if not values:
         return None
     # As in the CSV export, so that a channel has one name in both.
@@ -103,10 +90,8 @@ def _trace(
     return Trace(run, name, unit, np.concatenate(times), np.concatenate(values), origin, attrs=attrs)
 
 
-def _stretch(
-    segment: Segment, archive: Archive, comma: bool, reading: Reading
-) -> tuple[FloatArray, FloatArray, int] | None:
-    """Times and values of a block, and how many of its records are blank; None if it holds typed text."""
+def _stretch(segment: Segment, archive: Archive, comma: bool, reading: Reading) -> tuple[FloatArray, FloatArray] | None:
+    """Times and values of a block; None if it holds typed text."""
     place = f"main.xml, line {segment.line}"
     if not (segment.size.isascii() and segment.size.isdigit() and len(segment.size) < 16):
         raise reading.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
@@ -115,12 +100,12 @@ def _stretch(
     if values is None:
         return None
     if size == 0:
-        return values, values, 0
+        return values, values
     if segment.times:
         times = _records(segment.times, size, archive, reading)
         if times is None or len(times) != len(values):
             raise reading.error(segment.times, f"does not hold one time for each of the {len(values)} values")
-        return times, values, len(values) - size
+        return times, values
     start, interval = (
         number(text.replace(",", ".") if comma else text, ".") for text in (segment.start, segment.interval)
     )
@@ -130,7 +115,7 @@ def _stretch(
             f"the clock of {segment.values} is IntervalCacheStartValue = {segment.start[:40]!r}, "
             f"IntervalCacheInterval = {segment.interval[:40]!r}; expected a time and a step > 0",
         )
-    return start + interval * np.arange(len(values), dtype=np.float64), values, len(values) - size
+    return start + interval * np.arange(len(values), dtype=np.float64), values
 
 
 def _records(member: str, size: int, archive: Archive, reading: Reading) -> FloatArray | None:
@@ -138,21 +123,18 @@ def _records(member: str, size: int, archive: Archive, reading: Reading) -> Floa
     content = b"".join(archive.pieces(member))
     count, rest = divmod(len(content), RECORD.itemsize)
     table = np.frombuffer(content, RECORD, count)
-    valid, marked = table["valid"], np.flatnonzero(table["valid"])
-
-    def error(record: int, message: str) -> DataFileError:
-        return reading.error(f"{member}, record {record}", message)
-
+    valid, marked, odd = table["valid"], np.flatnonzero(table["valid"]), np.flatnonzero(table["valid"] > 1)
     if count and valid[0] == _TYPED_TEXT:
         return None
-    if len(odd := np.flatnonzero(valid > 1)):
-        raise error(int(odd[0]) + 1, f"its valid flag is {valid[odd[0]]}, expected 0 or 1")
+    if len(odd):
+        raise reading.error(f"{member}, record {odd[0] + 1}", f"its valid flag is {valid[odd[0]]}, expected 0 or 1")
+    place = f"{member}, record {count}"
     if len(marked) > size:
-        raise error(count, f"has more valid records than the {size} of main.xml")
+        raise reading.error(place, f"has more valid records than the {size} of main.xml")
     if rest:
-        raise error(count + 1, f"is cut short: {rest} of {RECORD.itemsize} bytes")
+        raise reading.error(f"{member}, record {count + 1}", f"is cut short: {rest} of {RECORD.itemsize} bytes")
     if len(marked) < size:
-        raise error(count, f"{len(marked)} of {count} records are valid, main.xml announces {size}")
+        raise reading.error(place, f"{len(marked)} of {count} records are valid, main.xml announces {size}")
     end = int(marked[-1]) + 1 if size else 0
     return np.where(valid[:end] == 1, table["value"][:end], math.nan)
 
@@ -248,7 +230,16 @@ class _Handler:
             self._data_set = attributes
             self._data_sets += 1
         elif name == "DataSegmentElement" and self._data_set is not None:
-            self._begin(self._data_sources[-1], self._data_set)
+            source, run = self._data_sources[-1], self._data_set
+            self._segment = Segment(
+                measurement=source.get("MeasurementName", ""),
+                channel=source.get("ChannelIDName", ""),
+                unit=source.get("BaseUnit", ""),
+                run=run.get("DataGroupNumber", ""),
+                data_set=self._data_sets,
+                line=self.parser.CurrentLineNumber,
+                deleted=run.get("DataHasBeenDeleted", "").upper() == "TRUE",
+            )
         elif self._segment is not None and name == "DependentStorageElement":
             self._segment.values = _path(attributes.get("FileName", ""))
             self._segment.size = attributes.get("DataCacheDataSize", "")
@@ -263,17 +254,6 @@ class _Handler:
         text = next((attributes[key] for key in _UNIT_WORDS if attributes.get(key)), None)
         if code is not None and text is not None:
             self.found.units.setdefault(code, text)
-
-    def _begin(self, data_source: dict[str, Any], data_set: dict[str, str]) -> None:
-        self._segment = Segment(
-            measurement=data_source.get("MeasurementName", ""),
-            channel=data_source.get("ChannelIDName", ""),
-            unit=data_source.get("BaseUnit", ""),
-            run=data_set.get("DataGroupNumber", ""),
-            data_set=self._data_sets,
-            line=self.parser.CurrentLineNumber,
-            deleted=data_set.get("DataHasBeenDeleted", "").upper() == "TRUE",
-        )
 
     def _end(self, name: str) -> None:
         self._open.pop()

@@ -82,8 +82,7 @@ def _table(table: Iterator[Row], run: str, delimiter: str, reading: Reading, end
     line, fields = next(table)
     header, table = _header(checked_header(fields, line, reading), table, line, numerals, reading)
     if reading.units_row:
-        units, table = _units(table, reading.units_row, reading)
-        units += [""] * (len(header) - len(units))
+        units = _units(table, reading.units_row, reading) + [""] * len(header)
         header = [f"{name} ({unit})" if unit else name for name, unit in zip(header, units, strict=False)]
     picked = chosen(header, reading)
     if reading.columns is not None and set(picked) <= {"time", "run"}:
@@ -126,13 +125,11 @@ def _header(
     return [f"column {k + 1}" for k in range(len(top))], itertools.chain([(line, top)], table)
 
 
-def _units(table: Iterator[Row], at: int, reading: Reading) -> tuple[list[str], Iterator[Row]]:
-    """The row of units, without brackets, and the rows below it."""
-    for line, fields in table:
-        if line >= at:
-            if line == at:
-                return [text.strip().strip("[]()").strip() for text in fields], table
-            break
+def _units(table: Iterator[Row], at: int, reading: Reading) -> list[str]:
+    """The row of units, without brackets; those above it are passed over."""
+    line, fields = next((row for row in table if row[0] >= at), (0, []))
+    if line == at:
+        return [text.strip().strip("[]()").strip() for text in fields]
     raise reading.error(f"line {at}", "is no row of units below the header, as units_row says")
 
 

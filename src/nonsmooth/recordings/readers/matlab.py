@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Reading, inflation_limit
+from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Reading, inflation_limit, readable
 
 _HEADER = 128
 _INT8, _INT32, _MATRIX, _COMPRESSED = 1, 5, 14, 15
@@ -60,10 +60,8 @@ def load_v5(data: bytes, reading: Reading) -> dict[str, Any]:
 def _unpacked(packed: memoryview, limit: int, place: str, reading: Reading) -> bytes:
     """The bytes of a packed variable, at most ``limit``."""
     unpacker = zlib.decompressobj()
-    try:
+    with readable("unpacked", reading, place):
         found = unpacker.decompress(packed, limit + 1)
-    except zlib.error as error:
-        raise reading.error(place, f"cannot be unpacked, it is damaged ({error})") from None
     if len(found) > limit:
         raise reading.error(place, f"unpacks to more than {limit} bytes, more than the file's size warrants")
     if not unpacker.eof:

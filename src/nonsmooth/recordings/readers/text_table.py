@@ -29,13 +29,9 @@ _SNIFFED = 20  # rows looked at to tell the decimal mark
 
 def decoded(data: bytes, reading: Reading) -> io.TextIOWrapper:
     """The text of a file: UTF-8 or UTF-16 with or without mark, else Windows-1252 (with a remark)."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        encoding = "utf-16"
-    else:
-        encoding = "utf-8-sig"
-        nul = data.find(b"\0")
-        if nul >= 0:
-            raise reading.error(f"line {_line_of(data, nul)}", "holds a zero byte; this is not a text table")
+    encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
+    if encoding != "utf-16" and (nul := data.find(b"\0")) >= 0:
+        raise reading.error(f"line {_line_of(data, nul)}", "holds a zero byte; this is not a text table")
     try:
         data.decode(encoding)
     except UnicodeDecodeError as error:
@@ -60,10 +56,7 @@ def sniffed(line: str) -> str:
 def rows(lines: Iterable[str], delimiter: str, reading: Reading, first_line: int = 1) -> Iterator[Row]:
     """Line number and fields of each row that is not empty. A delimiter of " " stands for any white space."""
     if delimiter == " ":
-        for line, text in enumerate(lines, first_line):
-            fields = text.split()
-            if fields:
-                yield line, fields
+        yield from ((line, text.split()) for line, text in enumerate(lines, first_line) if text.strip())
         return
     reader = csv.reader(lines, delimiter=delimiter, strict=True)
     while True:
