@@ -173,8 +173,8 @@ def _along_sheets(centre: xr.Dataset, result: xr.Dataset, name: str, along: list
 def _sheet_numbers(value: FloatArray) -> FloatArray:
     """The number of turning points before each point."""
     up = np.sign(np.diff(value))
-    turns = np.concatenate([[0], np.cumsum(up[1:] * up[:-1] < 0)]) if len(up) else np.zeros(0)
-    return np.append(turns, turns[-1:]).astype(int) if len(turns) else np.zeros(len(value), int)
+    turns = np.cumsum(up[1:] * up[:-1] < 0)
+    return np.pad(turns, (1, len(value) - 1 - len(turns)), mode="edge") if len(turns) else np.zeros(len(value), int)
 
 
 def _length(branch: xr.Dataset, name: str) -> FloatArray:
@@ -189,18 +189,16 @@ def _length(branch: xr.Dataset, name: str) -> FloatArray:
 
 def _finer(length: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Values at FINER points to a step, by cubics that do not overshoot."""
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import PchipInterpolator, interp1d
 
     fine = np.interp(np.arange((len(length) - 1) * FINER + 1) / FINER, np.arange(len(length)), length)
 
     def finer(values: FloatArray) -> FloatArray:
         if len(length) < 2:
             return values
-        if not np.isfinite(values).all():
-            flat = values.reshape(len(values), -1)
-            dense = np.stack([np.interp(fine, length, column) for column in flat.T], axis=-1)
-            return dense.reshape(-1, *values.shape[1:])
-        return PchipInterpolator(length, values, axis=0)(fine)
+        if np.isfinite(values).all():
+            return PchipInterpolator(length, values, axis=0)(fine)
+        return interp1d(length, values, axis=0)(fine)
 
     return finer
 

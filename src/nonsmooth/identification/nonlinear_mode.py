@@ -36,6 +36,7 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.errors import SolveError
+from nonsmooth.recordings.signals.sections import first_zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +139,7 @@ class NonlinearMode:
         room = force - self.mass * a * D * np.sqrt(np.maximum(self.square(a) - D**2 / 4, 0.0))
         if room[0] < 0:
             return least
-        if not (room < 0).any():
-            return float(a[-1])
-        k = int(np.argmax(room < 0))
-        return float(a[k - 1] + (a[k] - a[k - 1]) * room[k - 1] / (room[k - 1] - room[k]))
+        return first_zero(a, room) if (room < 0).any() else float(a[-1])
 
 
 def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) -> FloatArray:
@@ -316,15 +314,14 @@ class ResponseFit:
             found[self.curve == c] = mode.slope(self.amplitude[self.curve == c], self.omega[self.curve == c])
         return found
 
-    def own(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def own(self) -> tuple[FloatArray, ...]:
         """Natural frequency (Hz) and damping ratio of each curve alone, at the amplitude of its phase resonance."""
         rows = []
         for c, mode in enumerate(self.modes):
             a, w = self.amplitude[self.curve == c], self.omega[self.curve == c]
             place = a[np.argmin(np.abs(np.log(self.mode.square(a) / w**2)))]
             rows.append((mode.natural_frequency(place), mode.damping_ratio(place), place))
-        frequency, ratio, place = np.array(rows, float).T
-        return frequency, ratio, place
+        return tuple(np.array(rows, float).T)
 
 
 def _column(curves: Sequence[Any], name: str) -> FloatArray | None:

@@ -127,15 +127,16 @@ def propagate(
     >>> bool(np.allclose(amplitude, np.quantile(band["drawn_F"], [0.025, 0.5, 0.975]) / np.hypot(3.0, 0.2)))
     True
     """
-    call, edges = _Call(verb, start, args, options), [real_number(q, "quantiles") for q in quantiles]
+    system = start.system if isinstance(start, Orbit) else start
+    call, edges = _caller(verb, start, args, options), [real_number(q, "quantiles") for q in quantiles]
     if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
         raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
     if draws < 2 and not first_order:
         raise ValueError(f"draws = {draws}: a band takes two and more, and some 200 to show its edges")
-    known = read_settings(settings, call.system)
-    base = nominal(call.system, found, known)
+    known = read_settings(settings, system)
+    base = nominal(system, found, known)
     centre = call(base, coarse=False)
-    systems, drawn = draw_systems(call.system, found, known, draws, seed, bounds)
+    systems, drawn = draw_systems(system, found, known, draws, seed, bounds)
     gathered = Gathered(centre)
     linear_part = to_first_order(centre, found, known, base, call) if first_order else {}
     try:
@@ -154,47 +155,45 @@ def propagate(
     return gathered.banded(edges, linear_part, drawn, base, seed)
 
 
-class _Call:
-    """The verb with its arguments, for one system after another."""
+def _caller(
+    verb: Callable[..., Any], start: Any, args: tuple[Any, ...], options: dict[str, Any]
+) -> Callable[..., xr.Dataset]:
+    """The verb with its arguments, for one system after another; ``coarse``: as draws are computed."""
+    try:
+        takes = set(inspect.signature(verb).parameters)
+    except (TypeError, ValueError):
+        takes = set()
+    for name in options.keys() - takes if hasattr(verb, "door") else ():
+        known = takes | declared(propagate).keys()
+        raise TypeError(unknown(name, "an option", f"propagate, nor of {verb.__name__}", known))
+    of_draws = {"step": max(COARSE, options.get("step", 0.05))} if {"step", "virtual"} <= takes else {}
+    quiet = {"progress": False} if "progress" in takes else {}
 
-    def __init__(self, verb: Callable[..., Any], start: Any, args: tuple[Any, ...], options: dict[str, Any]) -> None:
-        self.system = start.system if isinstance(start, Orbit) else start
-        self.verb, self.start, self.args, self.options = verb, start, args, dict(options)
-        try:
-            takes = set(inspect.signature(verb).parameters)
-        except (TypeError, ValueError):
-            takes = set()
-        for name in options.keys() - takes if hasattr(verb, "door") else ():
-            known = takes | declared(propagate).keys()
-            raise TypeError(unknown(name, "an option", f"propagate, nor of {verb.__name__}", known))
-        self.coarse = {"step": max(COARSE, self.options.get("step", 0.05))} if {"step", "virtual"} <= takes else {}
-        if "progress" in takes:
-            self.options.setdefault("progress", False)
-
-    def __call__(self, system: System, *, coarse: bool) -> xr.Dataset:
+    def call(system: System, *, coarse: bool) -> xr.Dataset:
         first: Any = system
-        if isinstance(self.start, Orbit):
+        if isinstance(start, Orbit):
             from nonsmooth.continuation.find import find_orbit
 
-            o = self.start
-            first = find_orbit(system, start=o.u, period_number=o.period_number or None, transient=0, progress=False)
-        options = {**self.options, **(self.coarse if coarse else {})}
+            number = start.period_number or None
+            first = find_orbit(system, start=start.u, period_number=number, transient=0, progress=False)
         with warnings.catch_warnings():
             if coarse:  # said once, of the parameters found
                 warnings.simplefilter("ignore")
-            result = self.verb(first, *self.args, **options)
+            result = verb(first, *args, **quiet | options | (of_draws if coarse else {}))
         if isinstance(result, xr.DataArray):
             result = result.to_dataset(name=result.name or "value")
         elif hasattr(result, "to_dataset"):
             result = result.to_dataset()
         if isinstance(result, int | float | np.number):
-            result = xr.Dataset({"value": ((), float(result))})
+            result = {"value": result}
         if isinstance(result, Mapping) and not isinstance(result, xr.Dataset):
             result = xr.Dataset({name: ((), float(value)) for name, value in result.items()})
         if not isinstance(result, xr.Dataset):
             given = type(result).__name__
             raise TypeError(f"the verb returned {given}; propagate takes Datasets, numbers and mappings of numbers")
         return result
+
+    return call
 
 
 DIFFERENCE = 0.1  # of a standard uncertainty, to either side

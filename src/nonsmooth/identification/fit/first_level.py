@@ -150,7 +150,7 @@ def other_beginnings(stage: Stage, i: int) -> list[tuple[float, Window, FloatArr
         if not any(motion is not None and int(motion.log.sample_mode[0]) == mode for motion in begun):
             continue  # the mode that is tried already, or one that a condition ends at once
         reach = np.where(known, 0.0, 0.2) * window.spread
-        trials += [trials[k % 2] + reach * rng.standard_normal(len(reach)) for k in range(_TRIED if reach.any() else 0)]
+        trials += [trials[k % 2] + reach * rng.standard_normal(len(reach)) for k in range(_TRIED * reach.any())]
         found += alone(stage, [(other, z) for z in trials], _FITTED)[:1]
     return found
 

@@ -138,11 +138,11 @@ def grow(
     told()
     wide, poor, stuck = length, _reduced(stage) > POOR, False
     while not poor and len(stage.problem.pieces) > len(problem.records) and wide < longest:
-        for factor in (4.0, 2.0):
-            longer = _longer_windows(stage, min(factor * wide, longest))
+        for wider in (min(factor * wide, longest) for factor in (4.0, 2.0)):
+            longer = _longer_windows(stage, wider)
             told()
             if longer is not None:
-                stage, wide = longer, min(factor * wide, longest)
+                stage, wide = longer, wider
                 break
         else:
             stuck = _spreads(stage) < _REGULAR

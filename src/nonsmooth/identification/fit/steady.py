@@ -17,8 +17,10 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.errors import unknown
+from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
 from nonsmooth.system.kinds import float_array
@@ -197,16 +199,11 @@ def predicted(
     """Predicted readings of the sensors (N,), whether the motion is periodic, and the derivatives
     (N, n_active + 2): in the active parameters, in the sensor's gain and in its offset. NaN where no motion comes to
     its end."""
-    from nonsmooth.attractors.settled import usable
-    from nonsmooth.attractors.settler import Settler
-    from nonsmooth.flow.sections import Stroboscopic, section_plan
-
     system, count, a = marcher.system, len(one.values), marcher.flow.n_active
     points = np.tile(values, (count, 1))
     points[:, one.places] = one.values
-    settler = Settler(
-        system, marcher.engine, section_plan(system, Stroboscopic(0.0))[1], TRANSIENT, KEPT, LONGEST, False
-    )
+    plan = section_plan(system, Stroboscopic(0.0))[1]
+    settler = Settler(system, marcher.engine, plan, TRANSIENT, KEPT, LONGEST, False)
     rows = np.concatenate([np.arange(count), np.arange(count)[::-1]])
     found = settler.run(points, rows, np.repeat(start_states(system, None)[:1], len(rows), axis=0), carried=True)
     columns = [list(system.states).index(name) for name in one.quantities]
@@ -225,13 +222,10 @@ def predicted(
         for job in (i, 2 * count - 1 - i):
             if not good[job]:
                 continue
-            if one.amplitude:
-                raw, ahead = 0.5 * (found.maximum[job] - found.minimum[job])[None, columns], 1
-            else:
-                raw, ahead = (
-                    _points(settler, points[i], found, job, shape[0])[:, columns],
-                    int(found.period_number[job]),
-                )
+            raw, ahead = 0.5 * (found.maximum[job] - found.minimum[job])[None], 1
+            if not one.amplitude:
+                raw, ahead = _points(settler, points[i], found, job, shape[0]), int(found.period_number[job])
+            raw = raw[:, columns]
             for shift in range(max(ahead, 1)):
                 y = raw[shift : shift + shape[0]]
                 far = float(np.sum(((one.measured[mine] - (gain * y + offset).ravel()) / one.noise[mine]) ** 2))

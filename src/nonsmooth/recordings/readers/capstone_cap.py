@@ -174,101 +174,84 @@ class Experiment:
 
 def parse(pieces: Iterable[bytes], reading: Reading) -> Experiment:
     """Read the pieces of ``main.xml``; DataFileError with its line for anything that is not as it should be."""
-    handler = _Handler(reading)
-    parser = handler.parser
+    parser, found = expat.ParserCreate(), Experiment()
+    nested: list[str] = []
+    sources: list[dict[str, str]] = []
+    run: dict[str, str] | None = None
+    segment: Segment | None = None
+    runs = 0
+
+    def error(message: str) -> DataFileError:
+        return reading.error(f"main.xml, line {parser.CurrentLineNumber}", message)
+
+    def refuse(*_: Any) -> None:
+        raise error("declares a document type or entities, which no Capstone file does; refused")
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal run, segment, runs
+        if not nested and name != "DSProExperiment":
+            raise error(f"the root is {name[:60]!r}, expected DSProExperiment")
+        nested.append(name)
+        if len(nested) > _MAX_NESTING:
+            raise error(f"elements are nested deeper than {_MAX_NESTING}")
+        if name == "Header":
+            found.header.update({key: attributes[key] for key in list(attributes)[:64]})
+        elif name == "Sensor" and len(found.sensors) < MAX_COLUMNS:
+            kept = ("Name", "DistanceForFullRotation", "SamplePeriod")
+            found.sensors.append({key: attributes[key] for key in kept if key in attributes})
+        elif name == "DataSource":
+            sources.append(attributes)
+        elif "Unit" in name and len(found.units) < MAX_COLUMNS:  # a number, and the symbol or name that it stands for
+            code = next((value for key, value in attributes.items() if key.endswith("ID") and value.isdigit()), None)
+            text = next((attributes[key] for key in _UNIT_WORDS if attributes.get(key)), None)
+            if code is not None and text is not None:
+                found.units.setdefault(code, text)
+        elif name == "DataSet" and sources:
+            run = attributes
+            runs += 1
+        elif name == "DataSegmentElement" and run is not None:
+            segment = Segment(
+                measurement=sources[-1].get("MeasurementName", ""),
+                channel=sources[-1].get("ChannelIDName", ""),
+                unit=sources[-1].get("BaseUnit", ""),
+                run=run.get("DataGroupNumber", ""),
+                data_set=runs,
+                line=parser.CurrentLineNumber,
+                deleted=run.get("DataHasBeenDeleted", "").upper() == "TRUE",
+            )
+        elif segment is not None and name == "DependentStorageElement":
+            segment.values = _path(attributes.get("FileName", ""))
+            segment.size = attributes.get("DataCacheDataSize", "")
+        elif segment is not None and name == "IndependentStorageElement":
+            segment.times = _path(attributes.get("FileName", ""))
+            segment.start = attributes.get("IntervalCacheStartValue", "")
+            segment.interval = attributes.get("IntervalCacheInterval", "")
+
+    def end(name: str) -> None:
+        nonlocal run, segment
+        nested.pop()
+        if name == "DataSegmentElement" and segment is not None:
+            if len(found.segments) >= 4 * MAX_COLUMNS:
+                raise error(f"holds more than {4 * MAX_COLUMNS} blocks of data")
+            if segment.values:
+                found.segments.append(segment)
+            elif len(found.empty) < MAX_COLUMNS:
+                found.empty.append((segment.run, segment.measurement))
+            segment = None
+        elif name == "DataSet":
+            run = None
+        elif name == "DataSource" and sources:
+            sources.pop()
+
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    parser.StartElementHandler, parser.EndElementHandler = start, end
     try:
         for piece in pieces:
             parser.Parse(piece, False)
         parser.Parse(b"", True)
-    except expat.ExpatError as error:
-        raise reading.error(f"main.xml, line {error.lineno}", f"is not well-formed XML ({error})") from None
-    if not handler.rooted:
-        raise reading.error("main.xml", "holds no element; expected the root DSProExperiment")
-    return handler.found
-
-
-class _Handler:
-    def __init__(self, reading: Reading) -> None:
-        self.found = Experiment()
-        self.rooted = False
-        self.parser = expat.ParserCreate()
-        self._reading = reading
-        self._open: list[str] = []
-        self._data_sources: list[dict[str, Any]] = []
-        self._data_set: dict[str, str] | None = None
-        self._data_sets = 0
-        self._segment: Segment | None = None
-        self.parser.StartDoctypeDeclHandler = self._refuse
-        self.parser.EntityDeclHandler = self._refuse
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-
-    def _error(self, message: str) -> DataFileError:
-        return self._reading.error(f"main.xml, line {self.parser.CurrentLineNumber}", message)
-
-    def _refuse(self, *_: Any) -> None:
-        raise self._error("declares a document type or entities, which no Capstone file does; refused")
-
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        if not self.rooted:
-            if name != "DSProExperiment":
-                raise self._error(f"the root is {name[:60]!r}, expected DSProExperiment")
-            self.rooted = True
-        self._open.append(name)
-        if len(self._open) > _MAX_NESTING:
-            raise self._error(f"elements are nested deeper than {_MAX_NESTING}")
-        if name == "Header":
-            self.found.header.update({key: attributes[key] for key in list(attributes)[:64]})
-        elif name == "Sensor" and len(self.found.sensors) < MAX_COLUMNS:
-            kept = ("Name", "DistanceForFullRotation", "SamplePeriod")
-            self.found.sensors.append({key: attributes[key] for key in kept if key in attributes})
-        elif name == "DataSource":
-            self._data_sources.append(attributes)
-        elif "Unit" in name and len(self.found.units) < MAX_COLUMNS:
-            self._unit(attributes)
-        elif name == "DataSet" and self._data_sources:
-            self._data_set = attributes
-            self._data_sets += 1
-        elif name == "DataSegmentElement" and self._data_set is not None:
-            source, run = self._data_sources[-1], self._data_set
-            self._segment = Segment(
-                measurement=source.get("MeasurementName", ""),
-                channel=source.get("ChannelIDName", ""),
-                unit=source.get("BaseUnit", ""),
-                run=run.get("DataGroupNumber", ""),
-                data_set=self._data_sets,
-                line=self.parser.CurrentLineNumber,
-                deleted=run.get("DataHasBeenDeleted", "").upper() == "TRUE",
-            )
-        elif self._segment is not None and name == "DependentStorageElement":
-            self._segment.values = _path(attributes.get("FileName", ""))
-            self._segment.size = attributes.get("DataCacheDataSize", "")
-        elif self._segment is not None and name == "IndependentStorageElement":
-            self._segment.times = _path(attributes.get("FileName", ""))
-            self._segment.start = attributes.get("IntervalCacheStartValue", "")
-            self._segment.interval = attributes.get("IntervalCacheInterval", "")
-
-    def _unit(self, attributes: dict[str, str]) -> None:
-        """A row of a table of units: a number, and the symbol or name that it stands for."""
-        code = next((value for key, value in attributes.items() if key.endswith("ID") and value.isdigit()), None)
-        text = next((attributes[key] for key in _UNIT_WORDS if attributes.get(key)), None)
-        if code is not None and text is not None:
-            self.found.units.setdefault(code, text)
-
-    def _end(self, name: str) -> None:
-        self._open.pop()
-        if name == "DataSegmentElement" and self._segment is not None:
-            if len(self.found.segments) >= 4 * MAX_COLUMNS:
-                raise self._error(f"holds more than {4 * MAX_COLUMNS} blocks of data")
-            if self._segment.values:
-                self.found.segments.append(self._segment)
-            elif len(self.found.empty) < MAX_COLUMNS:
-                self.found.empty.append((self._segment.run, self._segment.measurement))
-            self._segment = None
-        elif name == "DataSet":
-            self._data_set = None
-        elif name == "DataSource" and self._data_sources:
-            self._data_sources.pop()
+    except expat.ExpatError as why:
+        raise reading.error(f"main.xml, line {why.lineno}", f"is not well-formed XML ({why})") from None
+    return found
 
 
 def _path(text: str) -> str:
