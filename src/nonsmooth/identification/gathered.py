@@ -103,9 +103,7 @@ class Gathered:
                 ),
                 "period_value": labelled("period_value", numbers, "period number"),
             }
-        if array.dtype.kind != "f":
-            return {}
-        return self._numbers(name, stack, edges)
+        return self._numbers(name, stack, edges) if array.dtype.kind == "f" else {}
 
     def _numbers(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
         array = self.centre[name]
@@ -222,9 +220,8 @@ def matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:
     found = np.full(centre[value].shape, np.nan)
     if value not in result or not result[value].size or not found.size:
         return found
-    keys = [key for key in shared if key in centre]
-    ours = list(zip(*(centre[key].values.astype(str) for key in keys), strict=True))
-    theirs = list(zip(*(result[key].values.astype(str) for key in keys), strict=True))
-    for i, j in nearest_alike(centre[value].values, result[value].values, ours, theirs).items():
+    keys, both = [key for key in shared if key in centre], (centre, result)
+    kinds = (list(zip(*(one[key].values.astype(str) for key in keys), strict=True)) for one in both)
+    for i, j in nearest_alike(*(one[value].values for one in both), *kinds).items():
         found[i] = result[value].values[j]
     return found

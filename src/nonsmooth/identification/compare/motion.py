@@ -82,10 +82,10 @@ def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, 
     if start is not None:
         return np.atleast_2d(np.asarray(start, float))
     at_zero = points if folded is None else folded[np.isfinite(folded[:, 0]).all(axis=1), 0]
-    count = 0 if at_zero is None else min(MEASURED_STARTS, len(at_zero))
+    at_zero = np.zeros((0, len(model.states))) if at_zero is None else at_zero
+    count = min(MEASURED_STARTS, len(at_zero))
     starts = np.zeros((1 + count, len(model.theory.states)))
-    if at_zero is not None:
-        starts[1:, model.places] = at_zero[np.linspace(0, len(at_zero) - 1, count).astype(int)]
+    starts[1:, model.places] = at_zero[np.linspace(0, len(at_zero) - 1, count).astype(int)]
     return starts
 
 
@@ -144,8 +144,9 @@ def _clouds(
 def _periods(
     number: int, predicted: Prediction, section: FloatArray, scale: FloatArray, states: list[str]
 ) -> dict[str, Any]:
-    words = "the same" if number == predicted.period_number else "others"
-    rows = [(number, section, "measured"), (predicted.period_number, predicted.sections[0], "predicted")]
+    theory = predicted.period_number
+    words = "the same" if number == theory else "others"
+    rows = [(number, section, "measured"), (theory, predicted.sections[0], "predicted")]
     (low, single, _), (high, doubled, whose) = sorted(rows, key=lambda row: row[0])
     if low > 0 and high == 2 * low and (apart := _doubled(single, doubled, scale, low)) is not None:
         by = ", ".join(f"{far:.2g} in {name}" for far, name in zip(apart, states, strict=True))
@@ -154,13 +155,11 @@ def _periods(
     return {
         "measured_period_number": labelled((), np.int64(number), "measured period number (0: none found)"),
         "theory_period_number": labelled(
-            (), np.int64(predicted.period_number), "period number of the nearest predicted motion (0: none found)"
+            (), np.int64(theory), "period number of the nearest predicted motion (0: none found)"
         ),
         "coexisting_period_number": labelled("attractor", coexisting, "period numbers of all predicted motions"),
         "period_agrees": labelled(
-            (),
-            np.int8(number == predicted.period_number),
-            "1 where the nearest predicted motion has the measured period number",
+            (), np.int8(number == theory), "1 where the nearest predicted motion has the measured period number"
         ),
         "period_coexists": labelled(
             (), np.int8(number in coexisting), "1 where the measured period number is among the predicted ones"

@@ -124,7 +124,7 @@ def _nearest(jumps: Sequence[AmplitudeJump], value: float) -> float:
     return near if np.isfinite(value) else np.nan
 
 
-def nearest_alike(ours: Any, theirs: Any, our_kinds: Sequence[Any], their_kinds: Sequence[Any]) -> dict[int, int]:
+def nearest_alike(ours: Any, theirs: Any, our_kinds: Any, their_kinds: Any) -> dict[int, int]:
     """Pairs of values of one kind, by their places, so that the sum of their distances is least; the order is kept."""
     from scipy.optimize import linear_sum_assignment
 

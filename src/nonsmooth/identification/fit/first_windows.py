@@ -24,12 +24,11 @@ WIDE = 3.0  # a start may move by so many times the size of its state
 
 def first_length(problem: Windows) -> float:
     """Length of the first windows: a part of a swing to and fro, and samples enough for a start."""
-    found = []
-    n = problem.marcher.flow.n
+    found, least = [], 3 * problem.marcher.flow.n + 6  # samples
     for record in problem.records:
         columns = [y[np.isfinite(y)] for y in record.values.T]
-        longest = _OF_A_SWING * 2.0 * record.duration / max(min([turns_of(y) for y in columns if len(y)]), 4)
-        found.append(max(longest, (3 * n + 6) * record.duration / (len(record.time) - 1)))
+        swing = 2.0 * record.duration / max(min(turns_of(y) for y in columns if len(y)), 4)
+        found.append(max(_OF_A_SWING * swing, least * record.duration / (len(record.time) - 1)))
     return float(np.median(found))
 
 

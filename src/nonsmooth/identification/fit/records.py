@@ -77,8 +77,9 @@ def read_records(
         raise ValueError(f"the list of recordings is empty; give {FORMS}")
     tables: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
     still = {f"{i}" if len(given) > 1 else "steady": one for i, one in enumerate(given) if is_steady(one)}
+    clock = options.get("time", "time")
     for i, one in enumerate(given):
-        found = {} if is_steady(one) else _tables(one, runs, options.get("time", "time"))
+        found = {} if is_steady(one) else _tables(one, runs, clock)
         for name, table in found.items():
             label = name if len(given) == 1 else f"{i}" if len(found) == 1 else f"{i} {name}"
             tables[label] = table
@@ -89,7 +90,7 @@ def read_records(
     channels = list(dict.fromkeys(name for table in tables.values() for name in table))
     quantities = [] if tables else [q for one in steady for q in one.quantities]
     sensors = read_sensors(system, measured, channels or quantities)
-    units, clock = [_units(one) for one in given], options.get("time", "time")
+    units = [_units(one) for one in given]
     ours = {**system.states, **system.outputs}
     _compare_units("recording", clock, units, "s" if any(system.states.values()) else "", "times in that unit")
     for quantity, sensor in sensors.items():
@@ -158,8 +159,8 @@ def _joined(label: str, columns: list[tuple[FloatArray, FloatArray]], settings: 
         raise ValueError(f"run {label!r} has {len(time)} samples; a fit needs at least 8: give a longer record")
     values = np.full((len(time), len(kept)), np.nan)
     for c, (t, y) in enumerate(kept):
-        if (np.diff(t) <= 0).any():
-            where = int(np.flatnonzero(np.diff(t) <= 0)[0])
+        if len(back := np.flatnonzero(np.diff(t) <= 0)):
+            where = back[0]
             raise ValueError(
                 f"run {label!r}: the time must increase from sample to sample; sample {where + 1} is at "
                 f"{t[where + 1]:.9g} after {t[where]:.9g}: sort the samples, or give each run by itself"

@@ -324,6 +324,6 @@ def _extreme(motion: SampledMotion, k: int, sign: float) -> float:
     i = 1 + np.argmax(y[1:-1])
     if motion.segment[i - 1] != motion.segment[i + 1]:
         return float(t[i])
-    one, other = t[i] - t[i - 1], t[i + 1] - t[i]
-    down, up = (y[i] - y[i - 1]) / one, (y[i + 1] - y[i]) / other
+    one, other = np.diff(t[i - 1 : i + 2])
+    down, up = np.diff(y[i - 1 : i + 2]) / (one, other)
     return float(t[i] + 0.5 * (down * other + up * one) / (down - up)) if down > up else float(t[i])

@@ -49,7 +49,7 @@ def read(data: bytes, reading: Reading) -> None:
     if reading.columns is not None or reading.rate is not None or reading.axis != "time":
         raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
     delimiter = reading.delimiter or _delimiter(data, reading)
-    numerals = Numerals(reading.decimal or ("." if delimiter == "," else None), reading.thousands, reading.na or ())
+    numerals = Numerals.of(delimiter, reading)
     table = rows(decoded(data, reading), delimiter, reading)
     line, fields = next(table, (1, []))
     header = checked_header(fields, line, reading)

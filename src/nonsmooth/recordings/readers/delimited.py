@@ -77,8 +77,7 @@ def _kept(stream: Iterable[str], reading: Reading, top: list[str], comments: lis
 
 
 def _table(table: Iterator[Row], run: str, delimiter: str, reading: Reading, ends: bool) -> Iterator[Trace]:
-    decimal = reading.decimal or ("." if delimiter == "," else None)
-    numerals = Numerals(decimal, reading.thousands, reading.na or ())
+    numerals = Numerals.of(delimiter, reading)
     line, fields = next(table)
     header, table = _header(checked_header(fields, line, reading), table, line, numerals, reading)
     if reading.units_row:
@@ -96,9 +95,8 @@ def _table(table: Iterator[Row], run: str, delimiter: str, reading: Reading, end
     left = [text for k, text in enumerate(header) if k not in wanted and text.strip()]
     if left:
         reading.say(f"columns not asked for are left out: {names_of(left)}")
-    place = {column: k for k, column in enumerate(wanted)}
     found = [
-        Field(name, unit, cells.values[place[c]], f"column {c + 1} ({header[c]})", cells.rows[place[c]])
+        Field(name, unit, cells.values[c], f"column {c + 1} ({header[c]})", cells.rows[c])
         for name, (c, unit) in picked.items()
     ]
     reading.told.update(delimiter=delimiter, columns=len(header), rows=len(cells.lines))

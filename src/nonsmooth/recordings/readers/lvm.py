@@ -180,7 +180,7 @@ def _traces(
         raise reading.error(at, f"its channels are over {dimension!r}; read it with axis={dimension.lower()!r}")
     unit = "s" if reading.axis == "time" else texts("X_Unit_Label")[0]
     for k, name in enumerate(names):
-        column = 2 * k + 1 if clocks == "Multi" else k + (clocks != "No")
+        column = 2 * k + 1 if clocks == "Multi" else k + 1
         rows, values = cells.rows[column], cells.values[column]
         if clocks == "Multi":
             axis, held = cells.values[column - 1], cells.rows[column - 1]
