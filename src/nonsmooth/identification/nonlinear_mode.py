@@ -255,7 +255,9 @@ class ResponseFit:
             freedom = max(rows - (count - (prior @ np.diag(inverse))), 1.0)
             before, moved = (sigma, *spread), 0.0
             # Points of a curve that err alike count less.
-            sigma = max(np.sqrt(left @ left / freedom * self._alike(left)), 1e-9)
+            each, same, power = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0, float(left @ left)
+            rho = min(max(np.sum((each[:, 1:] * each[:, :-1])[:, same]) / power, 0.0), 0.9) if power > 0 else 0.0
+            sigma = max(np.sqrt(power / freedom * (1 + rho) / (1 - rho)), 1e-9)
             if self.shifts:
                 own, own_error = p[shift].reshape(2, n), np.diag(inverse)[shift].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
@@ -299,13 +301,6 @@ class ResponseFit:
         else:
             p[self.at["load"]] = -np.log(h.max() * at_top)
         return p
-
-    def _alike(self, left: FloatArray) -> float:
-        """Number of neighbouring points of a curve that say as much as one."""
-        rows, same = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0
-        power = float(left @ left)
-        rho = min(max(np.sum((rows[:, 1:] * rows[:, :-1])[:, same]) / power, 0.0), 0.9) if power > 0 else 0.0
-        return (1 + rho) / (1 - rho)
 
     def slopes(self) -> FloatArray:
         """d ln F / d ln a at the points' frequencies, each curve's own shift taken into account."""

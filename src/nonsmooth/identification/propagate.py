@@ -10,7 +10,6 @@ from typing import Annotated, Any
 import numpy as np
 import xarray as xr
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.errors import Interrupted, SolveError, shortened, unknown
 from nonsmooth.identification.compare.draws import Setting, draw_systems, known_together, nominal, read_settings
@@ -199,29 +198,24 @@ def _caller(
 DIFFERENCE = 0.1  # of a standard uncertainty, to either side
 
 
-def _sources(found: Any, settings: Mapping[str, Setting], system: System) -> tuple[list[tuple[str, float]], FloatArray]:
-    """Uncertain parameters with their standard uncertainties, and their covariance."""
-    from scipy.linalg import block_diag
-
-    names, joint = known_together(found, system.values.keys() - settings.keys())
-    own = [(n, one.uncertainty) for n, one in settings.items() if one.uncertainty > 0 and not one.follows]
-    matrix = block_diag(joint, np.diag([error**2 for _, error in own]))
-    return [*zip(names, np.sqrt(np.diag(joint)).tolist(), strict=True), *own], matrix
-
-
 def to_first_order(
     branch: xr.Dataset, found: Any, settings: Mapping[str, Setting], system: System, call: Callable[..., Any]
 ) -> dict[str, Any]:
     """Derivatives of special points in the uncertain parameters, and their standard uncertainties."""
+    from scipy.linalg import block_diag
+
     from nonsmooth.continuation.special import special_points
 
     if "special_point" not in branch:
         raise ValueError("first_order concerns the special points of a branch: give continue_orbit as the verb")
     if any(one.follows for one in settings.values()):
         raise ValueError("first_order takes settings with values: one that is a function is left to the draws")
-    sources, covariance = _sources(found, settings, system)
-    some = [i for i, (_, error) in enumerate(sources) if error > 0]
-    sources, covariance = [sources[i] for i in some], covariance[np.ix_(some, some)]
+    names, joint = known_together(found, system.values.keys() - settings.keys())
+    set_ = [(name, one.uncertainty) for name, one in settings.items() if one.uncertainty > 0]
+    covariance = block_diag(joint, np.diag([error**2 for _, error in set_]))
+    every = [*zip(names, np.sqrt(np.diag(joint)).tolist(), strict=True), *set_]
+    some = [i for i, (_, error) in enumerate(every) if error > 0]
+    sources, covariance = [every[i] for i in some], covariance[np.ix_(some, some)]
     own = str(branch.attrs["parameter"])
     table = special_points(branch)
     slope = np.array(

@@ -131,7 +131,11 @@ def compare(
     set_ = read_settings(settings, theory) if isinstance(theory, System) else {}
     if not isinstance(theory, System) and (parameters is not None or settings):
         raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
-    options["draws"] = _draws(options["draws"], theory, parameters, set_)
+    if options["draws"] is None:  # none of a theory in which no uncertainty shows
+        uncertain = hasattr(parameters, "covariance") or any(
+            pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in set_.values()
+        )
+        options["draws"] = DRAWS if uncertain and hasattr(theory, "parameters") else 0
     if not 0 < options["level"] < 1:
         raise ValueError(f"level = {options['level']!r} must lie between 0 and 1, as 0.95")
     if not isinstance(measured, xr.Dataset) or channels is not None:
@@ -176,16 +180,6 @@ def compare(
         variables = compare_motion(measured, model, start, phases)
     result = _dataset(variables, measured, model, kind, given)
     return result.squeeze("section_phase") if kind == "motion" and np.ndim(section_phase) == 0 else result
-
-
-def _draws(given: int | None, theory: Any, parameters: Any, settings: Mapping[str, Any]) -> int:
-    """The number of draws; where none is given, none of a theory in which no uncertainty shows."""
-    if given is not None:
-        return given
-    uncertain = hasattr(parameters, "covariance") or any(
-        pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in settings.values()
-    )
-    return DRAWS if uncertain and hasattr(theory, "parameters") else 0
 
 
 def _kind(measured: xr.Dataset, parameter: str | None) -> str:

@@ -38,7 +38,11 @@ def compare_motion(
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     noise = model.noise
-    folded, returns = _measured(measured, phases, model.grid)
+    if "u" in measured:
+        turns, u = (measured[name].values.astype(float) for name in ("phase", "u"))
+        folded, returns = fold(turns, u, model.grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
+    else:
+        folded, returns = None, [measured["section"].values.astype(float)]
     sections = [points[np.isfinite(points).all(axis=1)] for points in returns]
     scale = np.maximum(np.concatenate(sections).std(axis=0), noise)
     number = measured_period(returns[0], noise, max_period=model.max_period).number
@@ -65,13 +69,6 @@ def compare_motion(
         variables |= drawn
     named = {"long_name": "phase of the section", "units": "forcing periods"}
     return variables | {"section_phase": ("section_phase", np.array(phases), named)}
-
-
-def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[FloatArray | None, list[FloatArray]]:
-    if "u" not in measured:
-        return None, [np.asarray(measured["section"].values, float)]
-    turns, u = np.asarray(measured["phase"].values, float), np.asarray(measured["u"].values, float)
-    return fold(turns, u, grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
 
 
 def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, start: Any) -> Any:

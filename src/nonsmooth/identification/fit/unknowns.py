@@ -84,7 +84,13 @@ def read_unknowns(
     """
     given = [parameters] if isinstance(parameters, str) else list(parameters)
     bounds = dict(parameters) if isinstance(parameters, Mapping) else {}
-    known = _known_unknowns(system, sensors)
+    known = {"clock": (1.0, ""), "phase": (0.0, "periods")}  # first guess and unit of all that may be found
+    known |= {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
+    for q, unit in {**system.states, **system.outputs}.items():
+        if q in sensors:
+            inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
+            for what, of in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
+                known[f"{q}.{what}"] = (getattr(sensors[q], what), of)
     allowed = {name: unit for name, (_, unit) in known.items()}
     if not given:
         raise ValueError(f"parameters names nothing to be found; allowed: {', '.join(allowed)}")
@@ -142,17 +148,6 @@ def read_unknowns(
         precision,
         places,
     )
-
-
-def _known_unknowns(system: System, sensors: Mapping[str, Sensor]) -> dict[str, tuple[float, str]]:
-    """First guess and unit of everything that may be found."""
-    found = {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
-    for q, unit in {**system.states, **system.outputs}.items():
-        if q in sensors:
-            inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
-            for what, own in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
-                found[f"{q}.{what}"] = (getattr(sensors[q], what), own)
-    return {"clock": (1.0, ""), "phase": (0.0, "periods"), **found}
 
 
 def _known(names: list[str], priors: Any, guess: FloatArray) -> tuple[FloatArray, FloatArray]:

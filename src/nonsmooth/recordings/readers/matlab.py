@@ -41,7 +41,13 @@ def load_v5(data: bytes, reading: Reading) -> dict[str, Any]:
     for kind, body, position in _elements(memoryview(data), order, "variable at ", reading, _HEADER):
         place = f"variable at byte {position}"
         if kind == _COMPRESSED:
-            unpacked = _unpacked(body, left, place, reading)
+            unpacker = zlib.decompressobj()
+            with readable("unpacked", reading, place):
+                unpacked = unpacker.decompress(body, left + 1)
+            if len(unpacked) > left:
+                raise reading.error(place, f"unpacks to more than {left} bytes, more than the file's size warrants")
+            if not unpacker.eof:
+                raise reading.error(place, "cannot be unpacked, it is cut short")
             left -= len(unpacked)
             kind, body, _ = next(_elements(memoryview(unpacked), order, f"{place}, ", reading), (0, body, 0))
         if kind != _MATRIX:
@@ -55,18 +61,6 @@ def load_v5(data: bytes, reading: Reading) -> dict[str, Any]:
             plain += struct.pack(order + "II", _MATRIX, len(body)) + body
     found = loadmat(io.BytesIO(bytes(plain)), struct_as_record=True, squeeze_me=False, mat_dtype=False)
     return {name: _plain(value) for name, value in found.items() if not name.startswith("__")}
-
-
-def _unpacked(packed: memoryview, limit: int, place: str, reading: Reading) -> bytes:
-    """The bytes of a packed variable, at most ``limit``."""
-    unpacker = zlib.decompressobj()
-    with readable("unpacked", reading, place):
-        found = unpacker.decompress(packed, limit + 1)
-    if len(found) > limit:
-        raise reading.error(place, f"unpacks to more than {limit} bytes, more than the file's size warrants")
-    if not unpacker.eof:
-        raise reading.error(place, "cannot be unpacked, it is cut short")
-    return found
 
 
 def _elements(

@@ -141,7 +141,11 @@ def read_cells(
     """
     n = len(labels)
     head = [row for _, row in zip(range(_SNIFFED), table, strict=False)]
-    decimal, thousands, na = numerals.decimal or _decimal_of(head, wanted), numerals.thousands, numerals.na
+    decimal, thousands, na = numerals
+    if decimal is None:  # a comma, if there are fields that are numbers with one and none that are with a point
+        fields = [row[k] for _, row in head for k in wanted if k < len(row)]
+        commas, points = (any(mark in f and number(f, mark) is not None for f in fields) for mark in ",.")
+        decimal = "," if commas and not points else "."
     begins = next((row[stamped] for _, row in head if len(row) > stamped >= 0 and row[stamped].strip()), "0")
     stamps: list[str] | None = None if number(begins, decimal, thousands) is not None else []
     values = {column: array("d") for column in wanted}
@@ -222,14 +226,6 @@ def _no_number(column: int, fields: list[str], labels: Sequence[str], decimal: s
         options = f"if it marks a missing value, na={shown.strip()!r}"
     said = f"column {column + 1} ({labels[column]!r}) holds {shown!r}, expected a number with the decimal mark"
     return f"{said} {decimal!r}, or nothing; {options}"
-
-
-def _decimal_of(head: list[Row], wanted: Sequence[int]) -> str:
-    """A comma, if there are fields that are numbers with one and none that are numbers with a point."""
-    fields = [row[k] for _, row in head for k in wanted if k < len(row)]
-    commas = any("," in f and number(f, ",") is not None for f in fields)
-    points = any("." in f and number(f, ".") is not None for f in fields)
-    return "," if commas and not points else "."
 
 
 def _line_of(data: bytes, position: int) -> int:

@@ -70,7 +70,16 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
             f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
             "mass, upwards, at a rate that shows its flights"
         )
-    acceleration, error, noise = _common_fall(t, z, rows)
+    parts, freedom = [], -1
+    for a, b in rows:  # of each flight its own line is taken out
+        s = t[a : b + 1] - t[a]
+        Q, _ = np.linalg.qr(np.column_stack([np.ones_like(s), s]))
+        parts.append([y - Q @ (Q.T @ y) for y in (0.5 * s * s, z[a : b + 1])])
+        freedom += len(s) - 2
+    q, y = map(np.concatenate, zip(*parts, strict=True))
+    acceleration = float(q @ y / (q @ q))
+    left = y - acceleration * q
+    noise = math.sqrt(float(left @ left) / max(freedom, 1))
     first, last = np.array(rows).T
     return xr.Dataset(
         {
@@ -79,7 +88,7 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
             "begin": ("flight", t[first], {"units": "s"}),
             "end": ("flight", t[last], {"units": "s"}),
             "acceleration": labelled((), acceleration, "acceleration in flight"),
-            "acceleration_error": ((), error),
+            "acceleration_error": ((), noise / math.sqrt(float(q @ q))),
             "noise": labelled((), noise, "standard deviation of a sample"),
         }
     )
@@ -174,22 +183,6 @@ def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type,
     data["flight"] = labelled("impact", column("flight", int), "flight before")
     data |= {name: labelled("impact", column(name, kind), text) for name, (kind, text) in more.items()}
     return xr.Dataset(data)
-
-
-def _common_fall(t: FloatArray, z: FloatArray, rows: list[tuple[int, int]]) -> tuple[float, float, float]:
-    """Acceleration common to all flights, its error, and the noise: each flight's line is taken out first."""
-    parts, freedom = [], -1
-    for a, b in rows:
-        s = t[a : b + 1] - t[a]
-        Q, _ = np.linalg.qr(np.column_stack([np.ones_like(s), s]))
-        q, y = 0.5 * s * s, z[a : b + 1]
-        parts.append((q - Q @ (Q.T @ q), y - Q @ (Q.T @ y)))
-        freedom += len(s) - 2
-    q, y = map(np.concatenate, zip(*parts, strict=True))
-    fall = float(q @ y / (q @ q))
-    left = y - fall * q
-    noise = math.sqrt(float(left @ left) / max(freedom, 1))
-    return fall, noise / math.sqrt(float(q @ q)), noise
 
 
 class _Side:

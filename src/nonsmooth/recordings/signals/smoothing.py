@@ -152,18 +152,15 @@ class _Nodes:
         # At the bound of a soft contact the force turns off its course: the jerk jumps.
         self.jump = np.select([self.kind == 2, self.kind == 3], [1, min(3, order)], order).astype(np.int64)
         self.inside = np.searchsorted(contacts, when[sort] - 0.5 * self.step * self.h, side="right") % 2 == 1
-        self.wide = self._wide(t[good] / self.h, (x[good] - self.offset) / self.sigma)
+        # Variances far above those of the state: a start, or a derivative that jumps, is not to be guided.
+        steps, level, wide = np.diff(t[good] / self.h), (x[good] - self.offset) / self.sigma, []
+        for _ in range(order):
+            wide.append(1e2 * np.max(np.abs(level)) ** 2 + 1e2)
+            level = np.diff(level) / np.maximum(steps[: len(level) - 1], 0.2)
+        self.wide = np.array(wide)
         n, count_nodes = order, len(when)
         self.u, self.P = np.zeros((2, count_nodes, n)), np.zeros((2, count_nodes, n, n))  # predicted, filtered
         self.work, self.sums = np.zeros((5, n, n)), np.zeros(2)
-
-    def _wide(self, t: FloatArray, y: FloatArray) -> FloatArray:
-        """Variances far above those of the state: a start, or a derivative that jumps, is not to be guided."""
-        level, wide = y, []
-        for k in range(self.order):
-            wide.append(1e2 * np.max(np.abs(level - (level[0] if k == 0 else 0.0))) ** 2 + 1e2)
-            level = np.diff(level) / np.maximum(np.diff(t[: len(level)]), 0.2)
-        return np.array(wide)
 
     def scaled(self, intensity: float | tuple[float, float]) -> FloatArray:
         given = np.atleast_1d(np.asarray(intensity, float))
