@@ -133,7 +133,12 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
     digest = hashlib.sha256(data).hexdigest()
     reading = Reading(name=name, size=len(data), sha256=digest, **vars(options or Options()))
     if data.startswith(b"\x1f\x8b"):
-        data = _unpacked(data, reading)
+        limit = inflation_limit(len(data))
+        with readable("unpacked", reading), gzip.open(io.BytesIO(data)) as packed:
+            data = packed.read(limit + 1)
+        if len(data) > limit:
+            why = f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself"
+            raise reading.error("", why)
     reading.format = format if format is not None else _detect(data, reading)
     read = import_module(f"nonsmooth.recordings.readers.{FORMATS[reading.format]}").read
     # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
@@ -141,16 +146,6 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
         read(data, reading)
         _replace_units(reading)
         return assemble(reading)
-
-
-def _unpacked(data: bytes, reading: Reading) -> bytes:
-    """The content of a file that gzip has packed."""
-    limit = inflation_limit(len(data))
-    with readable("unpacked", reading), gzip.open(io.BytesIO(data)) as packed:
-        content = packed.read(limit + 1)
-    if len(content) > limit:
-        raise reading.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
-    return content
 
 
 def content_of(file: Path) -> bytes:

@@ -58,22 +58,16 @@ class Remarks:
         alike: dict[tuple[str, ...], list[tuple[str, str]]] = {}  # runs, each with its sentence
         for (run, text), channels in self._channels.items():
             kind = (re.sub(r"\d+", "#", text), *channels) if run else (run, text)
-            alike.setdefault(kind, []).append((run, _sentence(run, channels, text)))
+            each = list(dict.fromkeys(channels))
+            named = ", ".join(map(repr, each[:_NAMED])) + (f" and {len(each) - _NAMED} more" if each[_NAMED:] else "")
+            of = [f"run {run!r}"] * bool(run) + [f"channel{'s' if len(each) > 1 else ''} {named}"] * bool(each)
+            alike.setdefault(kind, []).append((run, f"{', '.join(of)}: {text}" if of else text))
         said: list[str] = []
         for group in alike.values():
             (_, first), (last, _), more = group[0], group[-1], len(group) - 1
             few = [text for _, text in group]
             said += few if more < _ALIKE else [f"{first} (and likewise {more} more runs, to {last!r})"]
         return tuple(said)
-
-
-def _sentence(run: str, channels: list[str], text: str) -> str:
-    channels = list(dict.fromkeys(channels))
-    named = ", ".join(map(repr, channels[:_NAMED]))
-    more = f" and {len(channels) - _NAMED} more" if len(channels) > _NAMED else ""
-    which = f"channel{'s' if len(channels) > 1 else ''} {named}{more}" if channels else ""
-    place = ", ".join(part for part in (f"run {run!r}" if run else "", which) if part)
-    return f"{place}: {text}" if place else text
 
 
 #: What instruments call the time column, lower case, in the languages their programs speak.

@@ -95,24 +95,25 @@ def even_rate(time: FloatArray, x: Any, purpose: str) -> float:
         If the rate changes, samples are missing, or the steps are uneven.
     """
     clock = examine(time)
+    if clock.regular:
+        return clock.rate
+    why = (
+        f"the samples are not evenly spaced; {purpose} needs an even rate: take smooth(), which does without, or "
+        "interpolate its result"
+    )
     if clock.change is not None:
         i, before, after = clock.change
-        raise ValueError(
-            f"{whose(x)}: the sample rate changes from {before:.6g} Hz to {after:.6g} Hz near t = {time[i]:.9g} s; "
+        why = (
+            f"the sample rate changes from {before:.6g} Hz to {after:.6g} Hz near t = {time[i]:.9g} s; "
             f"{purpose} needs one rate: split the record there"
         )
-    if clock.gaps:
+    elif clock.gaps:
         i, count = clock.gaps[0]
-        raise ValueError(
-            f"{whose(x)}: {count} samples are missing after t = {time[i]:.9g} s; {purpose} needs an even rate: "
+        why = (
+            f"{count} samples are missing after t = {time[i]:.9g} s; {purpose} needs an even rate: "
             "cut the record there, or take smooth(), which does without"
         )
-    if not clock.regular:
-        raise ValueError(
-            f"{whose(x)}: the samples are not evenly spaced; {purpose} needs an even rate: take smooth(), which "
-            "does without, or interpolate its result"
-        )
-    return clock.rate
+    raise ValueError(f"{whose(x)}: {why}")
 
 
 def take(
