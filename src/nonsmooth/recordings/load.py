@@ -149,12 +149,8 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
 
 
 def content_of(file: Path) -> bytes:
-    """The bytes of a regular file of at most 1 GiB.
-
-    Raises
-    ------
-    DataFileError
-        If it cannot be opened, is empty, too large, or no file: a pipe would wait for who writes into it.
+    """The bytes of a regular file of at most 1 GiB; DataFileError for any other: a pipe would wait for who writes
+    into it.
     """
     try:
         waiting = getattr(os, "O_NONBLOCK", 0)  # for the other end of a pipe

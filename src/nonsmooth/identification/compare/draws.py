@@ -46,11 +46,6 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
 
     Each is a number, a pair, or ``{"value": ..., "uncertainty": ...}``; the value may be a function of the other
     parameters (the force of a crank is ``lambda p: p["k"] * a``, and uncertain as k is).
-
-    Raises
-    ------
-    ValueError
-        A name that is no parameter of the system, or a negative uncertainty.
     """
     read: dict[str, Setting] = {}
     for name, given in (settings or {}).items():
@@ -95,27 +90,10 @@ def draw_systems(
 ) -> tuple[list[System], dict[str, np.ndarray]]:
     """Systems whose parameters are drawn from their joint law, and the draws by name.
 
-    Parameters
-    ----------
-    system : System
-    parameters : ParameterSet or mapping, optional
-        With ``draw(n, seed)`` that is used; with ``covariance`` (a DataArray over the parameters, twice), a normal law.
-        A mapping without either is taken as exact.
-    settings : mapping
-        As from :func:`read_settings`: independent, normal; a setting that is also a parameter replaces it.
-    draws, seed : int
-    bounds : mapping, optional
-        ``{name: (low, high)}``, None for no end: a draw outside is drawn again.
-
-    Raises
-    ------
-    ValueError
-        Bounds that are not such; a covariance from which almost no draw is allowed by the system's equations.
-
-    Notes
-    -----
-    A draw that the equations refuse (a mass below zero), or in which a positive parameter has become negative, is
-    drawn again: a damping known only to a factor has a law that ends at zero.
+    ``parameters`` with ``draw(n, seed)`` draw by it, with ``covariance`` by a normal law; a mapping without either is
+    exact. ``settings`` are independent and normal, and replace parameters. A draw outside of ``bounds``, one that the
+    equations refuse (a mass below zero), or in which a positive parameter has become negative, is drawn again: a
+    damping known only to a factor has a law that ends at zero.
     """
     rng = np.random.default_rng(seed)
     base = nominal(system, parameters, settings)

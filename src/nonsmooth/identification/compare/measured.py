@@ -92,24 +92,9 @@ def recorded_motion(
 ) -> xr.Dataset:
     """The readings of states as a motion over the drive's phase, their errors from the record's own irregularity.
 
-    Parameters
-    ----------
-    recording : Recording, Dataset, DataFrame or mapping
-    system : System
-        At its parameters: with the forcing period of the run.
-    channels : mapping of str to str or Sensor, optional
-        Which channel shows which state; channels named as states where not given.
-    run : str, optional
-        Needed where there are several.
-    found : mapping of str to Estimate
-        Unknowns beside the parameters that a fit has found, of all runs or of this one: the phase of the forcing at
-        t = 0, the clock, and gain, offset and delay of a channel that is given by its name alone.
-
-    Raises
-    ------
-    ValueError, TypeError
-        No recording, several runs, outputs among the quantities, channels whose clocks differ, a system without a
-        period.
+    ``system`` is at its parameters, with the forcing period of the run. ``found`` are unknowns beside them that a fit
+    has found, of all runs or of this one: the phase of the forcing at t = 0, the clock, and gain, offset and delay of
+    a channel that is given by its name alone.
     """
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.sensors import Sensor

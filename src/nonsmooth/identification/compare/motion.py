@@ -244,22 +244,8 @@ def motion_band(
 ) -> dict[str, Any]:
     """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
 
-    Parameters
-    ----------
-    systems : list of System
-        As the model has drawn them.
-    model : Model
-    nearest : SteadyState
-        The nominal motion; each drawn system begins on it.
-    sections : list of array (n, states)
-        The measured clouds.
-    closed : (measured, predicted) orbits of shape (periods * grid, states), optional
-        Where both motions are periodic.
-
-    Notes
-    -----
-    A draw with another period number has another motion, not a point of the band: ``band_share`` says how many kept
-    theirs.
+    ``closed``: measured and predicted orbit (periods * grid, states), where both motions are periodic. A draw with
+    another period number has another motion, not a point of the band: ``band_share`` says how many kept theirs.
     """
     rng = np.random.default_rng(model.seed)
     draws = len(systems)

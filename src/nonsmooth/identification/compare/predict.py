@@ -36,22 +36,10 @@ class SteadyState(NamedTuple):
 
 
 class Motions:
-    """Steady motions of systems that differ in their parameters only: one engine, tables for all, no labels.
+    """Steady motions of forced systems that differ in their parameters only: one engine, tables for all, no labels.
 
-    Parameters
-    ----------
-    systems : sequence of System
-    model : Model
-        With transient, longest period, grid and solver, and the states that `cloud`, `orbit` and `carried` return.
-    keep : int
-        See :func:`nonsmooth.sweep`.
-    phase : float
-        Of the stroboscopic section, in forcing periods.
-
-    Raises
-    ------
-    ValueError
-        Systems that are not forced.
+    ``cloud``, ``orbit`` and ``carried`` return the states of the model that are compared; ``phase`` is that of the
+    section.
     """
 
     def __init__(self, systems: Sequence[System], model: Model, *, keep: int, phase: float = 0.0) -> None:
@@ -101,12 +89,7 @@ class Motions:
     def attractors(self, i: int, starts: Any) -> list[SteadyState]:
         """The different motions of system i that the starts settle on, in the order of the starts.
 
-        All motions without a period number count as one. A start that diverges leads to none.
-
-        Raises
-        ------
-        ValueError
-            No start leads to a motion.
+        All motions without a period number count as one. A start that diverges leads to none; ValueError where all do.
         """
         found: list[SteadyState] = []
         orbits: list[FloatArray] = []
@@ -200,13 +183,7 @@ def predict(
 
 
 def from_result(model: Model, phases: list[float]) -> Prediction:
-    """Theory read from a result of ``simulate``, ``poincare`` or ``sweep`` at one setting.
-
-    Raises
-    ------
-    ValueError
-        Neither a motion nor one section cloud.
-    """
+    """Theory read from a result of ``simulate``, ``poincare`` or ``sweep`` at one setting."""
     result = model.theory.sel(state=model.states)
     if "u" in result:
         if "phase" not in result and "omega" not in result.coords:

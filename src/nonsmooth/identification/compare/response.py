@@ -38,12 +38,7 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
 
     On the way to a fold the steps grow, so a jump need not be many times its neighbours. It is one where the step is
     larger than both by 2.5 times, and where the steps before and the steps after, each carried on evenly, both leave
-    more than half of it over.
-
-    Parameters
-    ----------
-    x, heights, error : array (n,)
-        Value of the parameter, amplitude and its standard error (0 where it is not known).
+    more than half of it over. ``error``: standard errors of the amplitudes, 0 where not known.
     """
     step = np.diff(heights)
     beyond = np.pad(step, 1, mode="edge") if len(step) else step  # where there is no further step, one as the last
@@ -76,24 +71,9 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
     """Pair the jumps of each direction in the order in which they are met, rises with rises and falls with falls.
 
     Where one side has more of a kind, those stay without a partner that leave the sum of the distances least, the
-    order being kept.
-
-    Parameters
-    ----------
-    measured, theory : mapping of direction to sequence of AmplitudeJump
-        In the order of the sweep.
-    drawn : sequence of such mappings
-        The predicted jumps for drawn parameters.
-    unit : str
-    level : float
-        Of the interval in which the drawn jumps lie.
-
-    Returns
-    -------
-    dict
-        Variables over ``jump``: ``jump_direction``, ``measured_jump``, ``theory_jump`` (NaN: no partner),
-        ``jump_difference`` (theory minus measurement), ``jump_tolerance`` (both half steps together: the difference is
-        not known better), and with draws ``theory_jump_low``, ``theory_jump_high``.
+    order being kept. Variables over ``jump``: ``jump_direction``, ``measured_jump``, ``theory_jump`` (NaN: no
+    partner), ``jump_difference`` (theory minus measurement), ``jump_tolerance`` (both half steps together: the
+    difference is not known better), and with draws ``theory_jump_low``, ``theory_jump_high``.
     """
     rows: list[tuple[str, AmplitudeJump, AmplitudeJump]] = []
     nothing = AmplitudeJump(np.nan)

@@ -104,13 +104,7 @@ _FITTED = 2  # of these
 
 
 def read_modes(system: System, given: Any, runs: Sequence[str]) -> list[tuple[int, ...]]:
-    """The modes in which each run may begin, the first guess first: all, or the one that is given.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A mode or a run that does not exist.
-    """
+    """The modes in which each run may begin, the first guess first: all, or the one that is given."""
     modes = list(system.modes)
     if given is None:
         return [tuple(range(len(modes)))] * len(runs)
@@ -163,13 +157,7 @@ _DRAWN = 60  # starts drawn for such a window
 
 
 def settle_first(problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool) -> Stage:
-    """The fit over windows of this length.
-
-    Raises
-    ------
-    SolveError
-        If no window of the record can be simulated.
-    """
+    """The fit over windows of this length; SolveError if no window of the record can be simulated."""
     now = problem.of(first_windows(problem, theta, length, start, free))
     if not now.pieces:
         raise SolveError("the motion of the first guess ends before any window of the record does")

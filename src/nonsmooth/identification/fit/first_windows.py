@@ -49,10 +49,8 @@ def first_windows(
 ) -> list[Window]:
     """Windows of about ``length``, each beginning as far as may be from a transition.
 
-    Parameters
-    ----------
-    start : array (records, n_u), optional
-        First guess of the states at the beginning of each record, or their values where not ``free``.
+    ``start`` (records, n_u): first guess of the states at the beginning of each record, or their values where not
+    ``free``.
     """
     n_u, memory = len(problem.system.states), problem.system.memory_vector()
     found: list[Window] = []

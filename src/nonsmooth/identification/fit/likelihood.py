@@ -46,12 +46,8 @@ def profiled(
 ) -> list[Finding]:
     """A finding for each of these unknowns.
 
-    Parameters
-    ----------
-    normal : array (p, p)
-        The normal matrix, priors included; its inverse would be the covariance of white residuals.
-    covariance : array (p, p)
-        That of the fit, by which the rise of chi^2 is scaled.
+    ``normal`` (p, p) is the normal matrix, priors included: its inverse would be the covariance of white residuals. By
+    the ``covariance`` of the fit the rise of chi^2 is scaled.
     """
     u, white, found = grown.problem.unknowns, np.diag(inverted(normal)[0]), []
     with progress(2 * len(names), "profiles", watched) as advance:
@@ -118,12 +114,7 @@ SAMPLED = (
 def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Finding:
     """Draws of the unknowns from their posterior; a note says whether there are enough.
 
-    Raises
-    ------
-    ImportError
-        Without emcee.
-    SolveError
-        Windows so many that an ensemble does not move, or a direction that nothing determines.
+    SolveError for windows so many that an ensemble does not move, or a direction that nothing determines.
     """
     try:
         import emcee

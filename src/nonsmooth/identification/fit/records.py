@@ -64,13 +64,7 @@ def irregularity(y: FloatArray, moving: bool = False) -> float:
 def read_records(
     system: System, recording: Any, options: Mapping[str, Any], inputs: Any = None
 ) -> tuple[dict[str, Sensor], list[Record], tuple[SteadyReadings, ...]]:
-    """The sensors and the records of a recording, and its readings of steady states; ``options`` as of `Recorded`.
-
-    Raises
-    ------
-    ValueError, TypeError
-        Something that is no recording, channels that do not exist, times that do not increase, too few samples.
-    """
+    """The sensors and the records of a recording, and its readings of steady states; ``options`` as of `Recorded`."""
     runs, measured = options.get("runs"), options.get("measured")
     given = list(recording) if isinstance(recording, list | tuple) else [recording]
     if not given:

@@ -120,14 +120,7 @@ def of_table(system: System, one: Any, name: str) -> xr.Dataset:
 
 
 def read_steady(system: System, one: Any, name: str, measured: Any, settings: Mapping[str, float]) -> SteadyReadings:
-    """Readings of a response or of sections.
-
-    Raises
-    ------
-    ValueError
-        A system without forcing, a parameter that is missing, quantities that are no states, sections without period
-        numbers.
-    """
+    """Readings of a response or of sections; ValueError that says what is missing of them, or of the system."""
     if system.period() is None or system.inputs:
         why = "inputs" if system.inputs else "no forcing period"
         raise ValueError(f"{system.name!r} has {why}; a response and sections are of steady states under a forcing")

@@ -76,11 +76,6 @@ def read_unknowns(
     """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own; the last
     ``steady`` runs have no phase. A parameter that is set in a run is known there; one that is called ``clock`` or
     ``phase`` is a parameter as any other.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A name that is no parameter, of no sensor, or twice there; bounds that the first guess is not within.
     """
     given = [parameters] if isinstance(parameters, str) else list(parameters)
     bounds = dict(parameters) if isinstance(parameters, Mapping) else {}

@@ -38,22 +38,11 @@ def warn(x: Any, sentence: str) -> None:
 def signal(
     time: ArrayLike, x: Any, *, least: int, purpose: str, missing: str = "error"
 ) -> tuple[FloatArray, FloatArray]:
-    """Times and values as arrays, checked.
+    """Times (s) and values as arrays of one length, increasing and finite; ValueError that says what to do where they
+    are not.
 
-    Parameters
-    ----------
-    time, x : array_like, shape (N,)
-        Seconds, increasing, and the values; a DataArray says whose they are in the messages.
-    least : int
-        The fewest samples that ``purpose`` needs.
-    missing : {"error", "keep"}
-        What values that are not finite lead to: an error, or a warning and their place kept.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ, a time is not finite or does not increase, values are missing (with
-        ``missing="error"``), or there are too few of them.
+    ``purpose`` needs at least so many samples. With ``missing="keep"`` values that are not finite keep their place,
+    with a warning.
     """
     name = whose(x)
     t, values = np.asarray(time, float), np.array(x, float)
@@ -87,12 +76,8 @@ def signal(
 
 
 def even_rate(time: FloatArray, x: Any, purpose: str) -> float:
-    """The one sample rate of a signal in Hz.
-
-    Raises
-    ------
-    ValueError
-        If the rate changes, samples are missing, or the steps are uneven.
+    """The one sample rate of a signal in Hz; ValueError where it changes, samples are missing, or the steps are
+    uneven.
     """
     clock = examine(time)
     if clock.regular:
