@@ -146,15 +146,13 @@ def take(
     if array.size < samples:
         raise ValueError(f"{name}: {array.size} samples are too short to identify anything from; {samples} are needed")
     (axis,) = array.dims
-    total, start, longest = missing_runs(np.asarray(array.values, float))
+    along, (total, start, longest) = array[axis].values, missing_runs(np.asarray(array.values, float))
     if total and missing == "error":
         raise ValueError(
             f"{name}: {total} of {array.size} values are not finite numbers, the longest run of them {longest} from "
-            f"{axis} = {float(array[axis][start]):.9g} on; cut the record there, leave this run out (of the notebook, "
-            "where there is one), or take(..., missing='keep') and smooth it, which bridges them"
+            f"{axis} = {along[start]:.9g} on; cut the record there, leave this run out (of the notebook, where there "
+            "is one), or take(..., missing='keep') and smooth it, which bridges them"
         )
-    if duration is not None:
-        length = float(array[axis][-1] - array[axis][0])
-        if length < duration:
-            raise ValueError(f"{name}: lasts {length:.4g} s, needed are {duration:.4g} s: record longer")
+    if duration is not None and (length := along[-1] - along[0]) < duration:
+        raise ValueError(f"{name}: lasts {length:.4g} s, needed are {duration:.4g} s: record longer")
     return array
