@@ -106,8 +106,8 @@ def sweep(
         ``equilibrium_minimum`` and ``equilibrium_maximum``. With ``density``, in place of
         ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
         the range) and ``bin_edge(state, edge)``. With ``loads``, of each element ``<element>_force_maximum``,
-        ``_force_minimum`` and ``_energy``, of rigid stops ``_impact_speed_maximum``, ``_impacts`` and ``_impulse`` too, and of
-        :func:`nonsmooth.mechanical` ``work_of_forcing``, ``work_of_damping`` and ``work_of_base``.
+        ``_force_minimum`` and ``_energy``, of rigid stops ``_impact_speed_maximum``, ``_impacts`` and ``_impulse`` too,
+        and of :func:`nonsmooth.mechanical` ``work_of_forcing``, ``work_of_damping`` and ``work_of_base``.
 
     Raises
     ------
