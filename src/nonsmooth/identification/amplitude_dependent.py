@@ -146,7 +146,7 @@ def amplitude_dependent(
     ]
     data = _data(fit, grid, *rows)
     ends = [
-        Estimate(float(values[i]), float(errors[i]), unit)
+        Estimate(values[i], errors[i], unit)
         for i in (0, -1)
         for (values, errors), unit in zip(rows, ("Hz", ""), strict=True)
     ]
@@ -210,7 +210,7 @@ def _others(fit: ResponseFit) -> dict[str, Estimate]:
         n = np.sqrt(2.0 * len(fit.names))
         f = 0.5 * float(np.sqrt(np.mean(fit.mode.squares)) / (2 * np.pi)) * float(fit.spread[0])
         found["f_n from curve to curve"] = Estimate(f, f / n, "Hz")
-        found["zeta from curve to curve, relative"] = Estimate(float(fit.spread[1]), float(fit.spread[1]) / n)
+        found["zeta from curve to curve, relative"] = Estimate(fit.spread[1], fit.spread[1] / n)
     return found
 
 
