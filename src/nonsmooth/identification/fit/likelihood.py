@@ -61,7 +61,7 @@ def profiled(
             values, rise = np.array(sorted([*above, (float(grown.theta[i]), 0.0)])).T
             best = values[np.argmin(rise)]  # a better fit than the best, where the sum of squares has corners
             rise = rise - rise.min()
-            estimate = Estimate(float(grown.theta[i]), error, u.units[i])
+            estimate = Estimate(grown.theta[i], error, u.units[i])
             ends = dict(zip(("low", "high"), limits_of(values, rise, best), strict=True))
             low, high = (f"{end:.4g}" if np.isfinite(end) else "no limit" for end in ends.values())
             by_error = " to ".join(f"{end:.4g}" for end in estimate.interval())
@@ -156,8 +156,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
     thin = max(1, int(tau / 5)) if np.isfinite(tau) else 1
     draws = sampler.get_chain(discard=int(_BURNT * steps), thin=thin, flat=True)[:, :p]
     rows = {
-        name: Estimate(float(np.mean(draws[:, i])), float(np.std(draws[:, i], ddof=1)), u.units[i])
-        for i, name in enumerate(u.names)
+        name: Estimate(np.mean(draws[:, i]), np.std(draws[:, i], ddof=1), u.units[i]) for i, name in enumerate(u.names)
     }
     notes = [
         f"{walkers} walkers, {steps} steps, the first {_BURNT:.0%} left out, every {thin}th kept; the chains forget "
