@@ -39,12 +39,12 @@ def not_installed(package: str, extra: str) -> str:
     )
 
 
-def check_keys(table: Iterable[str], allowed: Iterable[str], where: str, what: str) -> None:
-    """Check the keys of a table that a user wrote; ``where`` names its place, ``what`` a key with its article."""
+def check_keys(table: Iterable[str], allowed: Iterable[str], where: str, what: str, of: str = "this place") -> None:
+    """Check names that a user wrote; ``where`` names their place, ``what`` and ``of`` are as in :func:`unknown`."""
     known = list(allowed)
     for key in table:
         if key not in known:
-            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
+            raise ValueError(f"{where}: {unknown(key, what, of, known)}")
 
 
 def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterable[str]) -> str:

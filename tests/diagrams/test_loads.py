@@ -60,6 +60,7 @@ def test_impacts_between_two_stops(e: float) -> None:
         "impulse": m * (1 + e) * v,
         "energy": 0.5 * m * (1 - e**2) * v**2,
         "force_maximum": 0.0,
+        "force_minimum": 0.0,
     }
     for name in ("left", "right"):
         found = {key: orbit.loads[f"{name}_{key}"] for key in expected}
@@ -254,7 +255,7 @@ def test_sweep_chart_and_orbit_give_the_same_loads(tmp_path: Path) -> None:
     ]
     xr.testing.assert_identical(charts[0].drop_attrs(), charts[1].drop_attrs())
     names = [name for name in charts[0] if str(name) in swept and str(name).startswith(("rub", "soft", "work"))]
-    assert len(names) == 6
+    assert len(names) == 8
     for name in names:
         assert charts[0][name].values[:, 1] == pytest.approx(swept[name].values, rel=1e-10, abs=1e-11)
         assert charts[0][name].attrs["units"] == swept[name].attrs["units"]
@@ -324,7 +325,8 @@ def test_a_nonlinear_system_with_elements() -> None:
     power = np.where(closed, 0.8 * run["u"].values[:, 1] ** 2, 0.0)
     assert closed.any() and not closed.all()
     assert orbit.loads["soft_energy"] == pytest.approx(np.trapezoid(power, run["time"].values), rel=1e-6)
-    assert set(orbit.loads) == {"soft_force_maximum", "soft_energy"}
+    assert set(orbit.loads) == {"soft_force_maximum", "soft_force_minimum", "soft_energy"}
+    assert orbit.loads["soft_force_minimum"] == pytest.approx(run["soft_force"].values.min(), abs=1e-6)
 
 
 def test_three_balls_and_two_stops_at_one_place_share_impulses() -> None:

@@ -391,7 +391,8 @@ def test_arctan_weights_sum_to_one_where_three_regions_meet():
     assert len(set(traced.fields)) == 1
 
 
-def test_bands_that_cross_are_for_arctan_alone():
+@pytest.mark.parametrize("band", ["linear", "tanh", "arctan"])
+def test_where_bands_cross_each_element_does_its_part(band):
     two = ns.mechanical(
         1.0,
         0.1,
@@ -402,15 +403,30 @@ def test_bands_that_cross_are_for_arctan_alone():
             "wall": ns.elements.ElasticStop(at="q", position=1.0, stiffness="k"),
         },
     )
-    with pytest.raises(SystemDefinitionError, match='vanish together; bands may do so with band="arctan"'):
-        two.smoothed(1e-3)
-    smooth = two.smoothed(1e-3, "arctan")
-    traced = smooth.traced
+    traced = two.smoothed(1e-3, band).traced
     t, (q, v), (k, mu, eta) = traced.t, traced.u, traced.p
-    pressed = k * (q - 1) * (sp.Rational(1, 2) + sp.atan((q - 1) / eta) / sp.pi)
-    force = -0.1 * v - q - 2 * mu * sp.atan(v / eta) / sp.pi - pressed
-    values = {t: 0.3, q: 1.01, v: -0.002, k: 5.0, mu: 0.2, eta: 1e-3}
-    assert float(traced.fields[0][1].subs(values)) == pytest.approx(float(force.subs(values)), rel=1e-12)
+    share = {"linear": lambda x: (1 + x) / 2, "tanh": lambda x: (1 + sp.tanh(x)) / 2}.get(
+        band, lambda x: sp.Rational(1, 2) + sp.atan(x) / sp.pi
+    )
+    force = -0.1 * v - q + mu * (1 - 2 * share(v / eta)) - k * (q - 1) * share((q - 1) / eta)
+    values = {t: 0.3, q: 1.0004, v: -0.0002, k: 5.0, mu: 0.2, eta: 1e-3}
+    assert float(traced.fields[-1][1].subs(values)) == pytest.approx(float(force.subs(values)), rel=1e-12)
+    assert len(traced.mode_names) == (4 if band == "arctan" else 9)
+
+
+def test_a_rubbing_preloaded_mass_has_no_mode_that_nothing_leads_to():
+    """No condition of one element leads where both hold: elements are asked there."""
+    held = ns.mechanical(
+        0.7,
+        0.0,
+        2.312,
+        elements={
+            "a": ns.elements.Coulomb(at="q", friction=0.2345),
+            "b": ns.elements.PreloadedSpring(at="q", preload=0.3, stiffness=1.0),
+        },
+    )
+    modes = held.smoothed(1e-2).modes
+    assert len(modes) == 9 and not any("stick" in mode or "held" in mode for mode in modes)
 
 
 def test_the_shape_of_a_band_is_part_of_a_system():

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from nonsmooth import models
+from nonsmooth import mechanical, models
+from nonsmooth.elements import Backlash, Coulomb, ElasticStop, PreloadedSpring, Stop
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import where
@@ -65,6 +66,57 @@ def test_text_and_back_is_the_same_system(make):
     assert again.values == system.values
     assert again.surfaces == system.surfaces
     assert again == system
+
+
+def pushed(elements, **options):
+    """One driven mass with elements."""
+    return mechanical(
+        [["m"]],
+        0.05,
+        1.0,
+        forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+        parameters={"m": (2.0, "kg"), "F": 0.5, "w": 0.8, "mu": 0.2, "e": 0.6},
+        elements=elements,
+        **options,
+    )
+
+
+ALONE = {
+    "stop": Stop(at="q", position=1.0, restitution="e"),
+    "friction": Coulomb(at="q", friction=lambda v, p: p.mu / (1 + v), static=0.3, belt="F"),
+    "spring": PreloadedSpring(at="q", preload="mu", stiffness=lambda t, u, p: 2 * p.mu),
+    "play": Backlash(at="q", half_width=2.0, stiffness=3.0, damping="mu"),
+    "support": ElasticStop(at="q", position="mu", stiffness=9.0, damping=0.1, pulls=np.True_, side=np.int64(-1)),
+}
+POWER = {"outputs": {"power": (lambda t, u, p: u.v_q * p.F, "W")}}
+MIRRORED = {
+    "play": {"e_above": "e_below", "e_below": "e_above"},
+    "spring": {"e_above": "e_below", "e_below": "e_above"},
+}
+BESIDE = [(name, beside) for name in ALONE for beside in ({}, POWER)]
+BESIDE += [(name, {"symmetry": (lambda u: -u, 0.5, swapped)}) for name, swapped in MIRRORED.items()]
+
+
+@pytest.mark.parametrize(("name", "beside"), BESIDE, ids=[f"{name} {' '.join(beside)}" for name, beside in BESIDE])
+def test_a_system_with_one_element_is_written_as_it_was_given(name, beside):
+    """One rule for all elements, those that decide alone too: the modes without them, and the elements."""
+    system = pushed({"e": ALONE[name]}, **beside)
+    content = json.loads(system.to_text())
+    assert list(content["modes"]) == ["all"] and list(content["elements"]) == ["e"]
+    again = System.from_text(system.to_text())
+    assert again.traced == system.traced and again == system and str(again) == str(system)
+    assert again.outputs == system.outputs and again.symmetry == system.symmetry
+
+
+def test_a_system_is_read_at_values_at_which_it_could_not_be_defined():
+    """A fit may come to a friction beside zero; a mass below it is refused in a text too."""
+    system = pushed({"rub": Coulomb(at="q", friction="mu")}).with_parameters(mu=-1e-9)
+    assert System.from_text(system.to_text()) == system
+    with pytest.raises(SystemDefinitionError, match="friction of element 'rub' must not be negative"):
+        pushed({"rub": Coulomb(at="q", friction=-1e-9)})
+    for elements in ({}, {"rub": ALONE["friction"]}, {"rub": ALONE["friction"], "stop": ALONE["stop"]}):
+        with pytest.raises(SystemDefinitionError, match="the mass of coordinate 'q' must be positive"):
+            System.from_text(pushed(elements).to_text()).with_parameters(m=-1.0)
 
 
 def test_the_hash_of_the_equations_does_not_see_values():

@@ -47,7 +47,7 @@ def _check(system: System, content: dict[str, Any], velocity: str, mass: str | f
         raise ValueError(unknown(mass, "a parameter", name, {k: one.unit for k, one in system.parameters.items()}))
     if "period" not in content:
         raise SystemDefinitionError(f"{name} has no forcing period, with which the reference of a controller repeats")
-    if system.is_smoothed or "elements" in content:
+    if system.is_smoothed or system.traced.asks:
         raise SystemDefinitionError(
             f"{name} is smoothed, or has so many elements that its modes are not written out: an actuator is added to "
             "the fields of modes; give the system before `smoothed`, or with fewer elements"

@@ -100,13 +100,14 @@ def sweep(
         Over the parameter (and ``direction``, ``start``): ``section(..., iterate, state)``, true extremes ``maximum``,
         ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
         ``contacts_per_period``, ``clearance``, extremes of the outputs (of one that is not affine in the states
-        NaN by the exact flow: give ``method="taylor"``), ``status``. Where some point stands:
+        NaN by the exact flow: give ``method="taylor"``; of elements that may share one load NaN: give ``loads=True``),
+        ``status``. Where some point stands:
         ``equilibrium``, its name (empty where it moves), and the extent of the set of equilibria that it belongs to,
         ``equilibrium_minimum`` and ``equilibrium_maximum``. With ``density``, in place of
         ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
-        the range) and ``bin_edge(state, edge)``. With ``loads``, of each element ``<element>_force_maximum`` and
-        ``<element>_energy``, of rigid stops ``_impact_speed_maximum``, ``_impacts`` and ``_impulse`` too, and of
-        :func:`nonsmooth.mechanical` ``work_of_forcing``, ``work_of_damping`` and ``work_of_base``.
+        the range) and ``bin_edge(state, edge)``. With ``loads``, of each element ``<element>_force_maximum``,
+        ``_force_minimum`` and ``_energy``, of rigid stops ``_impact_speed_maximum``, ``_impacts`` and ``_impulse`` too,
+        and of :func:`nonsmooth.mechanical` ``work_of_forcing``, ``work_of_damping`` and ``work_of_base``.
 
     Raises
     ------

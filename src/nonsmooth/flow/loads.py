@@ -90,7 +90,8 @@ class Meter:
         found = {}
         for k, load in enumerate(self.elements):
             force, rate, impulse, energy = self.units[load.name]
-            found[f"{load.name}_force_maximum"] = f"maximum of {load.name}_force", force
+            for end in ("maximum", "minimum"):
+                found[f"{load.name}_force_{end}"] = f"{end} of {load.name}_force", force
             if k in self.striking:
                 found[f"{load.name}_impact_speed_maximum"] = f"largest approach speed of {load.name}", rate
                 found[f"{load.name}_impacts"] = f"impacts of {load.name} per return", "1"
@@ -248,14 +249,14 @@ class Meter:
             return None
         count = len(self.elements)
         total = np.einsum("p,x,pxi->i", half, weight, seen[..., count:]) / returns
-        highest = _highest(seen[..., :count], back, fine[:, :count])
+        highest, lowest = (_highest(sign * seen[..., :count], back, fine[:, :count]) for sign in (1, -1))
         size = np.nanmax(np.abs(np.vstack([log.sample_u, log.u_before, log.u_after])), axis=0)
         impulses, speed, _, taken = self.impacts(
             values, log.crossing_time, log.u_before, log.u_after, log.memory_after, size
         )
         found = {}
         for k, load in enumerate(self.elements):
-            found[f"{load.name}_force_maximum"] = highest[k]
+            found[f"{load.name}_force_maximum"], found[f"{load.name}_force_minimum"] = highest[k], 0.0 - lowest[k]
             if k in self.striking:
                 j = self.striking.index(k)
                 struck = speed[~np.isnan(speed[:, j]), j]

@@ -140,41 +140,13 @@ def amplitude_dependent(
     by_square[:, fit.at["square"]] = basis * mode.squares / mode.square(grid)[:, None]
     by_zeta = -0.5 * by_square
     by_zeta[:, fit.at["damping"]] += basis
-    rows = [
+    (f, f_error), (zeta, zeta_error) = (
         (values, values * np.sqrt(np.einsum("ij,jk,ik->i", slope, fit.covariance, slope)))
         for values, slope in ((mode.natural_frequency(grid), 0.5 * by_square), (mode.damping_ratio(grid), by_zeta))
-    ]
-    data = _data(fit, grid, *rows)
-    ends = [
-        Estimate(float(values[i]), float(errors[i]), unit)
-        for i in (0, -1)
-        for (values, errors), unit in zip(rows, ("Hz", ""), strict=True)
-    ]
-    f_n, *rest = ends
-    others = dict(zip(("zeta", "f_n at the largest amplitude", "zeta at the largest amplitude"), rest, strict=True))
-    others |= _others(fit)
-    finding = Finding(
-        "f_n",
-        f_n,
-        _METHOD,
-        sum(len(c.frequency) for c in curves),
-        tuple(c.name for c in curves),
-        tuple(_notes(fit)),
-        others,
-        None,
-        data,
-        "backbone",
     )
-    return finding, mode
-
-
-def _data(
-    fit: ResponseFit, grid: FloatArray, natural: tuple[FloatArray, FloatArray], damping: tuple[FloatArray, FloatArray]
-) -> xr.Dataset:
-    """Data of the pictures; the backbone as values and errors over the grid."""
-    slope, (f, f_error), (zeta, zeta_error), own = fit.slopes(), natural, damping, fit.own()
-    rows: dict[str, Any] = {} if fit.force is None else {"force": ("point", fit.force, {"units": "N"})}
-    rows |= {
+    slope, own = fit.slopes(), fit.own()
+    table: dict[str, Any] = {} if fit.force is None else {"force": ("point", fit.force, {"units": "N"})}
+    table |= {
         "frequency": ("point", fit.omega / (2 * np.pi), {"units": "Hz"}),
         "response": ("point", np.abs(fit.measured), {"units": "m"}),
         "modal_amplitude": ("point", fit.amplitude, {"units": "m"}),
@@ -193,7 +165,23 @@ def _data(
         "amplitude": labelled("amplitude", grid, "amplitude of the mode", "m"),
         "curves": ("curves", list(fit.names)),
     }
-    return xr.Dataset(rows, coords, {"scatter": fit.sigma})
+    f_n, f_last = (Estimate(float(f[i]), float(f_error[i]), "Hz") for i in (0, -1))
+    zeta_n, zeta_last = (Estimate(float(zeta[i]), float(zeta_error[i])) for i in (0, -1))
+    others = {"zeta": zeta_n, "f_n at the largest amplitude": f_last, "zeta at the largest amplitude": zeta_last}
+    others |= _others(fit)
+    finding = Finding(
+        "f_n",
+        f_n,
+        _METHOD,
+        sum(len(c.frequency) for c in curves),
+        tuple(c.name for c in curves),
+        tuple(_notes(fit, slope)),
+        others,
+        None,
+        xr.Dataset(table, coords, {"scatter": fit.sigma}),
+        "backbone",
+    )
+    return finding, mode
 
 
 def _others(fit: ResponseFit) -> dict[str, Estimate]:
@@ -214,9 +202,8 @@ def _others(fit: ResponseFit) -> dict[str, Estimate]:
     return found
 
 
-def _notes(fit: ResponseFit) -> list[str]:
+def _notes(fit: ResponseFit, slope: FloatArray) -> list[str]:
     """Notes for a reader."""
-    slope = fit.slopes()
     unstable = int(np.count_nonzero(slope < 0))
     said = [
         f"{unstable} of {len(slope)} points lie on an unstable middle part (d ln F / d ln a < 0); the least slope "

@@ -121,16 +121,12 @@ def settle(
     known: FloatArray | None = None,
     rough: bool = False,
 ) -> tuple[FloatArray, FloatArray, Residuals]:
-    """Levenberg and Marquardt's iteration: parameters, starts, and the state there.
+    """Levenberg and Marquardt's iteration: parameters, starts, and the state there; `Unsettled` where it does not
+    settle.
 
     With ``rough`` it ends where it makes little way, or has taken all its iterations: a start for another fit.
     ``known`` is a precision in place of that of the priors. Directions of the parameters that `inverted` says are not
     determined are left as they are.
-
-    Raises
-    ------
-    SolveError
-        If it does not settle (`Unsettled`), within the iterations or at all.
     """
     u, damping, iterations = problem.unknowns, 1e-4, 30 if rough else 50
     prior = u.precision if known is None else known

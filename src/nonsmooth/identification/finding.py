@@ -162,6 +162,8 @@ class Estimate:
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
+        for name in ("value", "uncertainty", "half_width"):
+            object.__setattr__(self, name, float(getattr(self, name)))  # NumPy's numbers would show as such
         if self.uncertainty != self.uncertainty:
             raise ValueError("the data leave a value undetermined: its standard uncertainty would not be a number")
         if not self.uncertainty >= 0:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,7 +10,7 @@ import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.attractors.basins_matching import CLOSE
-from nonsmooth.identification.compare.draws import drawn_variables
+from nonsmooth.identification.compare.draws import drawn_variables, quantiles
 from nonsmooth.identification.compare.response import nearest_alike
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
@@ -92,9 +91,7 @@ class Gathered:
     def _of(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
         array = self.centre[name]
         if name.rpartition("_")[2] == "stable" or array.dtype.kind == "b":
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)  # no draw has this point
-                mean = np.nanmean(np.asarray(stack, float), axis=0)
+            mean = xr.DataArray(np.asarray(stack, float)).mean("dim_0").values  # NaN where no draw has this point
             return {f"{name}_probability": labelled(array.dims, mean, f"share of draws: {name}")}
         if name == "period_number":
             every = np.append(stack, array.values)
@@ -106,17 +103,12 @@ class Gathered:
                 ),
                 "period_value": labelled("period_value", numbers, "period number"),
             }
-        if array.dtype.kind != "f":
-            return {}
-        return self._numbers(name, stack, edges)
+        return self._numbers(name, stack, edges) if array.dtype.kind == "f" else {}
 
     def _numbers(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
         array = self.centre[name]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # no draw has a value here
-            bands = np.nanquantile(stack, edges, axis=0)
         attrs = {key: value for key, value in array.attrs.items() if isinstance(value, str)}
-        found = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
+        found = {f"{name}_quantiles": (("quantile", *array.dims), quantiles(stack, edges), attrs)}
         share = np.isfinite(stack).sum(axis=0) / len(self.rows)
         if (share < 1).any():
             found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")
@@ -179,8 +171,8 @@ def _along_sheets(centre: xr.Dataset, result: xr.Dataset, name: str, along: list
 def _sheet_numbers(value: FloatArray) -> FloatArray:
     """The number of turning points before each point."""
     up = np.sign(np.diff(value))
-    turns = np.concatenate([[0], np.cumsum(up[1:] * up[:-1] < 0)]) if len(up) else np.zeros(0)
-    return np.append(turns, turns[-1:]).astype(int) if len(turns) else np.zeros(len(value), int)
+    turns = np.cumsum(up[1:] * up[:-1] < 0)
+    return np.pad(turns, (1, len(value) - 1 - len(turns)), mode="edge") if len(turns) else np.zeros(len(value), int)
 
 
 def _length(branch: xr.Dataset, name: str) -> FloatArray:
@@ -195,18 +187,16 @@ def _length(branch: xr.Dataset, name: str) -> FloatArray:
 
 def _finer(length: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Values at FINER points to a step, by cubics that do not overshoot."""
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import PchipInterpolator, interp1d
 
     fine = np.interp(np.arange((len(length) - 1) * FINER + 1) / FINER, np.arange(len(length)), length)
 
     def finer(values: FloatArray) -> FloatArray:
         if len(length) < 2:
             return values
-        if not np.isfinite(values).all():
-            flat = values.reshape(len(values), -1)
-            dense = np.stack([np.interp(fine, length, column) for column in flat.T], axis=-1)
-            return dense.reshape(-1, *values.shape[1:])
-        return PchipInterpolator(length, values, axis=0)(fine)
+        if np.isfinite(values).all():
+            return PchipInterpolator(length, values, axis=0)(fine)
+        return interp1d(length, values, axis=0)(fine)
 
     return finer
 
@@ -230,9 +220,8 @@ def matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:
     found = np.full(centre[value].shape, np.nan)
     if value not in result or not result[value].size or not found.size:
         return found
-    keys = [key for key in shared if key in centre]
-    ours = list(zip(*(centre[key].values.astype(str) for key in keys), strict=True))
-    theirs = list(zip(*(result[key].values.astype(str) for key in keys), strict=True))
-    for i, j in nearest_alike(centre[value].values, result[value].values, ours, theirs).items():
+    keys, both = [key for key in shared if key in centre], (centre, result)
+    kinds = (list(zip(*(one[key].values.astype(str) for key in keys), strict=True)) for one in both)
+    for i, j in nearest_alike(*(one[value].values for one in both), *kinds).items():
         found[i] = result[value].values[j]
     return found

@@ -36,6 +36,7 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.errors import SolveError
+from nonsmooth.recordings.signals.sections import first_zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,10 +143,7 @@ class NonlinearMode:
         room = force - self.mass * a * D * np.sqrt(np.maximum(self.square(a) - D**2 / 4, 0.0))
         if room[0] < 0:
             return least
-        if not (room < 0).any():
-            return float(a[-1])
-        k = int(np.argmax(room < 0))
-        return float(a[k - 1] + (a[k] - a[k - 1]) * room[k - 1] / (room[k - 1] - room[k]))
+        return first_zero(a, room) if (room < 0).any() else float(a[-1])
 
 
 def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) -> FloatArray:
@@ -261,7 +259,9 @@ class ResponseFit:
             freedom = max(rows - (count - (prior @ np.diag(inverse))), 1.0)
             before, moved = (sigma, *spread), 0.0
             # Points of a curve that err alike count less.
-            sigma = max(np.sqrt(left @ left / freedom * self._alike(left)), 1e-9)
+            each, same, power = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0, float(left @ left)
+            rho = min(max(np.sum((each[:, 1:] * each[:, :-1])[:, same]) / power, 0.0), 0.9) if power > 0 else 0.0
+            sigma = max(np.sqrt(power / freedom * (1 + rho) / (1 - rho)), 1e-9)
             if self.shifts:
                 own, own_error = p[shift].reshape(2, n), np.diag(inverse)[shift].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
@@ -306,13 +306,6 @@ class ResponseFit:
             p[self.at["load"]] = -np.log(h.max() * at_top)
         return p
 
-    def _alike(self, left: FloatArray) -> float:
-        """Number of neighbouring points of a curve that say as much as one."""
-        rows, same = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0
-        power = float(left @ left)
-        rho = min(max(np.sum((rows[:, 1:] * rows[:, :-1])[:, same]) / power, 0.0), 0.9) if power > 0 else 0.0
-        return (1 + rho) / (1 - rho)
-
     def slopes(self) -> FloatArray:
         """d ln F / d ln a at the points' frequencies, each curve's own shift taken into account."""
         found = np.empty(len(self.omega))
@@ -320,15 +313,14 @@ class ResponseFit:
             found[self.curve == c] = mode.slope(self.amplitude[self.curve == c], self.omega[self.curve == c])
         return found
 
-    def own(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def own(self) -> tuple[FloatArray, ...]:
         """Natural frequency (Hz) and damping ratio of each curve alone, at the amplitude of its phase resonance."""
         rows = []
         for c, mode in enumerate(self.modes):
             a, w = self.amplitude[self.curve == c], self.omega[self.curve == c]
             place = a[np.argmin(np.abs(np.log(self.mode.square(a) / w**2)))]
             rows.append((mode.natural_frequency(place), mode.damping_ratio(place), place))
-        frequency, ratio, place = np.array(rows, float).T
-        return frequency, ratio, place
+        return tuple(np.array(rows, float).T)
 
 
 def _column(curves: Sequence[Any], name: str) -> FloatArray | None:

@@ -342,14 +342,9 @@ def _as_record(finding: Finding) -> dict[str, Any]:
 
 
 def _from_record(item: Mapping[str, Any]) -> Finding:
-
-    def estimate(row: Sequence[Any]) -> Estimate:
-        value, uncertainty, unit, half_width, logarithmic = row
-        return Estimate(float(value), float(uncertainty), unit, float(half_width), logarithmic)  # "inf" is a text there
-
     read = {
-        "estimate": estimate(item["estimate"]),
-        "others": {name: estimate(row) for name, row in item["others"].items()},
+        "estimate": Estimate(*item["estimate"]),  # which reads "inf", a text there
+        "others": {name: Estimate(*row) for name, row in item["others"].items()},
         **{name: tuple(item[name]) for name in ("runs", "notes")},
     }
     return Finding(**{**item, **read})

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 import numpy as np
 import xarray as xr
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.errors import Interrupted, SolveError, shortened, unknown
 from nonsmooth.identification.compare.draws import Setting, draw_systems, known_together, nominal, read_settings
@@ -129,15 +128,16 @@ def propagate(
     >>> bool(np.allclose(amplitude, np.quantile(band["drawn_F"], [0.025, 0.5, 0.975]) / np.hypot(3.0, 0.2)))
     True
     """
-    call, edges = _Call(verb, start, args, options), [real_number(q, "quantiles") for q in quantiles]
+    system = start.system if isinstance(start, Orbit) else start
+    call, edges = _caller(verb, start, args, options), [real_number(q, "quantiles") for q in quantiles]
     if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
         raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
     if draws < 2 and not first_order:
         raise ValueError(f"draws = {draws}: a band takes two and more, and some 200 to show its edges")
-    known = read_settings(settings, call.system)
-    base = nominal(call.system, found, known)
+    known = read_settings(settings, system)
+    base = nominal(system, found, known)
     centre = call(base, coarse=False)
-    systems, drawn = draw_systems(call.system, found, known, draws, seed, bounds)
+    systems, drawn = draw_systems(system, found, known, draws, seed, bounds)
     gathered = Gathered(centre)
     linear_part = to_first_order(centre, found, known, base, call) if first_order else {}
     try:
@@ -156,41 +156,37 @@ def propagate(
     return gathered.banded(edges, linear_part, drawn, base, seed)
 
 
-class _Call:
-    """The verb with its arguments, for one system after another."""
+def _caller(
+    verb: Callable[..., Any], start: Any, args: tuple[Any, ...], options: dict[str, Any]
+) -> Callable[..., xr.Dataset]:
+    """The verb with its arguments, for one system after another; ``coarse``: as draws are computed."""
+    try:
+        takes = set(inspect.signature(verb).parameters)
+    except (TypeError, ValueError):
+        takes = set()
+    for name in options.keys() - takes if hasattr(verb, "door") else ():
+        known = takes | declared(propagate).keys()
+        raise TypeError(unknown(name, "an option", f"propagate, nor of {verb.__name__}", known))
+    of_draws = {"step": max(COARSE, options.get("step", 0.05))} if {"step", "virtual"} <= takes else {}
+    quiet = {"progress": False} if "progress" in takes else {}
 
-    def __init__(self, verb: Callable[..., Any], start: Any, args: tuple[Any, ...], options: dict[str, Any]) -> None:
-        self.system = start.system if isinstance(start, Orbit) else start
-        self.verb, self.start, self.args, self.options = verb, start, args, dict(options)
-        try:
-            takes = set(inspect.signature(verb).parameters)
-        except (TypeError, ValueError):
-            takes = set()
-        for name in options.keys() - takes if hasattr(verb, "door") else ():
-            known = takes | declared(propagate).keys()
-            raise TypeError(unknown(name, "an option", f"propagate, nor of {verb.__name__}", known))
-        self.coarse = {"step": max(COARSE, self.options.get("step", 0.05))} if {"step", "virtual"} <= takes else {}
-        if "progress" in takes:
-            self.options.setdefault("progress", False)
-
-    def __call__(self, system: System, *, coarse: bool) -> xr.Dataset:
+    def call(system: System, *, coarse: bool) -> xr.Dataset:
         first: Any = system
-        if isinstance(self.start, Orbit):
+        if isinstance(start, Orbit):
             from nonsmooth.continuation.find import find_orbit
 
-            o = self.start
-            first = find_orbit(system, start=o.u, period_number=o.period_number or None, transient=0, progress=False)
-        options = {**self.options, **(self.coarse if coarse else {})}
+            number = start.period_number or None
+            first = find_orbit(system, start=start.u, period_number=number, transient=0, progress=False)
         with warnings.catch_warnings():
             if coarse:  # said once, of the parameters found
                 warnings.simplefilter("ignore")
-            result = self.verb(first, *self.args, **options)
+            result = verb(first, *args, **quiet | options | (of_draws if coarse else {}))
         if isinstance(result, xr.DataArray):
             result = result.to_dataset(name=result.name or "value")
         elif hasattr(result, "to_dataset"):
             result = result.to_dataset()
         if isinstance(result, int | float | np.number):
-            result = xr.Dataset({"value": ((), float(result))})
+            result = {"value": result}
         if isinstance(result, Mapping) and not isinstance(result, xr.Dataset):
             result = xr.Dataset({name: ((), float(value)) for name, value in result.items()})
         if not isinstance(result, xr.Dataset):
@@ -198,33 +194,30 @@ class _Call:
             raise TypeError(f"the verb returned {given}; propagate takes Datasets, numbers and mappings of numbers")
         return result
 
+    return call
+
 
 DIFFERENCE = 0.1  # of a standard uncertainty, to either side
-
-
-def _sources(found: Any, settings: Mapping[str, Setting], system: System) -> tuple[list[tuple[str, float]], FloatArray]:
-    """Uncertain parameters with their standard uncertainties, and their covariance."""
-    from scipy.linalg import block_diag
-
-    names, joint = known_together(found, system.values.keys() - settings.keys())
-    own = [(n, one.uncertainty) for n, one in settings.items() if one.uncertainty > 0 and not one.follows]
-    matrix = block_diag(joint, np.diag([error**2 for _, error in own]))
-    return [*zip(names, np.sqrt(np.diag(joint)).tolist(), strict=True), *own], matrix
 
 
 def to_first_order(
     branch: xr.Dataset, found: Any, settings: Mapping[str, Setting], system: System, call: Callable[..., Any]
 ) -> dict[str, Any]:
     """Derivatives of special points in the uncertain parameters, and their standard uncertainties."""
+    from scipy.linalg import block_diag
+
     from nonsmooth.continuation.special import special_points
 
     if "special_point" not in branch:
         raise ValueError("first_order concerns the special points of a branch: give continue_orbit as the verb")
     if any(one.follows for one in settings.values()):
         raise ValueError("first_order takes settings with values: one that is a function is left to the draws")
-    sources, covariance = _sources(found, settings, system)
-    some = [i for i, (_, error) in enumerate(sources) if error > 0]
-    sources, covariance = [sources[i] for i in some], covariance[np.ix_(some, some)]
+    names, joint = known_together(found, system.values.keys() - settings.keys())
+    set_ = [(name, one.uncertainty) for name, one in settings.items() if one.uncertainty > 0]
+    covariance = block_diag(joint, np.diag([error**2 for _, error in set_]))
+    every = [*zip(names, np.sqrt(np.diag(joint)).tolist(), strict=True), *set_]
+    some = [i for i, (_, error) in enumerate(every) if error > 0]
+    sources, covariance = [every[i] for i in some], covariance[np.ix_(some, some)]
     own = str(branch.attrs["parameter"])
     table = special_points(branch)
     slope = np.array(

@@ -10,6 +10,7 @@ import xarray as xr
 
 from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Trace
 from nonsmooth.recordings.recording import Recording, examine, missing_runs, mixed_units
+from nonsmooth.results.labels import labelled
 
 #: A sensor with fewer samples says next to nothing of a motion; below this a remark is made.
 SHORT = 32
@@ -33,16 +34,15 @@ def assemble(reading: Reading) -> Recording:
 
     runs: dict[str, dict[str, xr.Dataset]] = {}
     run_attrs: dict[str, dict[str, str]] = {}
-    names: dict[str, str] = {}
+    held: dict[str, dict[Any, list[Trace]]] = {}  # by run and clock
     for trace in traces:
-        if trace.run not in names:
-            names[trace.run] = _fit(trace.run or "run", names.values())
-            run_attrs[names[trace.run]] = {"long_name": trace.run, **reading.run_attrs.get(trace.run, {})}
-    for run, node in names.items():
-        sensors: dict[str, xr.Dataset] = {}
-        for group in _by_clock([trace for trace in traces if trace.run == run]):
+        held.setdefault(trace.run, {}).setdefault((trace.axis_unit, trace.axis.tobytes()), []).append(trace)
+    for run, by_clock in held.items():
+        node = _fit(run or "run", runs)
+        run_attrs[node] = {"long_name": run, **reading.run_attrs.get(run, {})}
+        sensors = runs[node] = {}
+        for group in by_clock.values():
             sensors[_fit(group[0].name or "sensor", sensors)] = _sensor(group, reading)
-        runs[node] = sensors
     record = {
         "file": reading.name,
         "format": reading.format,
@@ -54,24 +54,6 @@ def assemble(reading: Reading) -> Recording:
     return Recording.from_runs(
         runs, synthetic=reading.synthetic, source=record, warnings=reading.sentences(), run_attrs=run_attrs
     )
-
-
-def _by_clock(traces: list[Trace]) -> list[list[Trace]]:
-    """Traces sampled at the same instants, in the order in which their first one appears."""
-    groups: dict[tuple[int, bytes, str], list[list[Trace]]] = {}
-    ordered: list[list[Trace]] = []
-    for trace in traces:
-        axis = trace.axis
-        same = groups.setdefault((len(axis), axis[[0, -1]].tobytes(), trace.axis_unit), [])
-        for group in same:
-            if group[0].axis is axis or np.array_equal(group[0].axis, axis, equal_nan=True):
-                break
-        else:
-            group = []
-            same.append(group)
-            ordered.append(group)
-        group.append(trace)
-    return ordered
 
 
 def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
@@ -105,13 +87,9 @@ def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
         if name != trace.name and name != _clean(trace.name):
             sentence = f"the name stands there twice, or is the axis; this one is called {name!r}"
             reading.of(trace.run, trace.name, sentence)
-        variables[name] = (
-            axis,
-            trace.values,
-            {"long_name": trace.name, "units": trace.unit, "origin": trace.origin, **trace.attrs},
-        )
-    coordinate = (axis, first.axis, {"long_name": axis, "units": first.axis_unit})
-    return xr.Dataset(variables, {axis: coordinate}, attrs)
+        variables[name] = labelled(axis, trace.values, trace.name, trace.unit)
+        variables[name][2].update(origin=trace.origin, **trace.attrs)
+    return xr.Dataset(variables, {axis: labelled(axis, first.axis, axis, first.axis_unit)}, attrs)
 
 
 def _clock(trace: Trace, where: str, reading: Reading, note: Callable[[str], None]) -> dict[str, Any]:
@@ -142,25 +120,24 @@ def _clock(trace: Trace, where: str, reading: Reading, note: Callable[[str], Non
         note(f"gap of {count} samples after t = {time[i]:.9g} s ({trace.place(i)}); nothing was filled in")
     if len(clock.gaps) > 3:
         note(f"{len(clock.gaps) - 3} more gaps")
-    kind = "regular" if clock.regular else "irregular"
-    return {"rate": clock.rate, "sampling": kind}
+    return {"rate": clock.rate, "sampling": "regular" if clock.regular else "irregular"}
 
 
 def _compare_units(traces: list[Trace], reading: Reading) -> None:
-    units: dict[str, dict[str, str]] = {}
-    runs: dict[str, set[str]] = {}
+    units: dict[str, dict[str, list[str]]] = {}  # by channel, each with its runs
     for trace in traces:
-        runs.setdefault(trace.name, set()).add(trace.run)
-        units.setdefault(trace.name, {}).setdefault(trace.unit, trace.run)
+        units.setdefault(trace.name, {}).setdefault(trace.unit, []).append(trace.run)
     for name, found in units.items():
-        if set(found) == {""}:
-            (run,) = runs[name] if len(runs[name]) == 1 else ("",)
-            reading.of(run, name, f"the file gives no unit; say it with units={{{name!r}: ...}}")
+        if len(found) == 1 and "" in found:
+            run, *others = dict.fromkeys(found[""])
+            said = f"the file gives no unit; say it with units={{{name!r}: ...}}"
+            reading.of("" if others else run, name, said)
         if len(found) > 1:
+            first = {unit: runs[0] for unit, runs in found.items()}
             reading.of(
                 "",
                 name,
-                f"has units {mixed_units(found)}; nothing was converted: take each run's own unit, or read the runs "
+                f"has units {mixed_units(first)}; nothing was converted: take each run's own unit, or read the runs "
                 "one by one",
             )
 

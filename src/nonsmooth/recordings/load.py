@@ -9,7 +9,6 @@ import os
 import re
 import stat
 import warnings
-import zlib
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -19,14 +18,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
-from nonsmooth.recordings.reading import (
-    MAX_FILE_BYTES,
-    Options,
-    Reading,
-    Trace,
-    inflation_limit,
-    names_of,
-)
+from nonsmooth.recordings.reading import MAX_FILE_BYTES, Options, Reading, inflation_limit, names_of, readable
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.system.arguments import checked
 
@@ -131,8 +123,7 @@ def load_recording(path: str | os.PathLike[str], *, format: str | None = None, *
     recording = parse_recording(content_of(file), file.name, asked, format=format)
     for remark in recording.warnings[:_SPOKEN]:
         warnings.warn(f"{file.name}: {remark}", RecordingWarning, stacklevel=3)
-    if len(recording.warnings) > _SPOKEN:
-        more = len(recording.warnings) - _SPOKEN
+    if (more := len(recording.warnings) - _SPOKEN) > 0:
         warnings.warn(f"{file.name}: {more} more; see Recording.warnings", RecordingWarning, stacklevel=3)
     return recording
 
@@ -142,7 +133,12 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
     digest = hashlib.sha256(data).hexdigest()
     reading = Reading(name=name, size=len(data), sha256=digest, **vars(options or Options()))
     if data.startswith(b"\x1f\x8b"):
-        data = _unpacked(data, reading)
+        limit = inflation_limit(len(data))
+        with readable("unpacked", reading), gzip.open(io.BytesIO(data)) as packed:
+            data = packed.read(limit + 1)
+        if len(data) > limit:
+            why = f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself"
+            raise reading.error("", why)
     reading.format = format if format is not None else _detect(data, reading)
     read = import_module(f"nonsmooth.recordings.readers.{FORMATS[reading.format]}").read
     # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
@@ -152,26 +148,9 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
         return assemble(reading)
 
 
-def _unpacked(data: bytes, reading: Reading) -> bytes:
-    """The content of a file that gzip has packed."""
-    limit = inflation_limit(len(data))
-    try:
-        with gzip.open(io.BytesIO(data)) as packed:
-            content = packed.read(limit + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise reading.error("", f"cannot be unpacked, it is damaged or cut short ({error})") from error
-    if len(content) > limit:
-        raise reading.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
-    return content
-
-
 def content_of(file: Path) -> bytes:
-    """The bytes of a regular file of at most 1 GiB.
-
-    Raises
-    ------
-    DataFileError
-        If it cannot be opened, is empty, too large, or no file: a pipe would wait for who writes into it.
+    """The bytes of a regular file of at most 1 GiB; DataFileError for any other: a pipe would wait for who writes
+    into it.
     """
     try:
         waiting = getattr(os, "O_NONBLOCK", 0)  # for the other end of a pipe
@@ -202,12 +181,13 @@ def _detect(data: bytes, reading: Reading) -> str:
     if re.match(rb"\s*-1\s*\n\s+\d+", data[:200]):
         return "uff"
     if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        hint = "a .mat file of version 4 is not read: save it again with -v7" if reading.name.endswith(".mat") else ""
-        known = (
+        hint = " (a .mat file of version 4 is not read: save it again with -v7)"
+        raise reading.error(
+            "",
             "is none of the formats known: Capstone .csv and .cap, tables, .xlsx, LabVIEW .lvm and .tdms, MATLAB .mat, "
             "HDF5, .npy and .npz, Parquet and Feather, .wav, universal files, .mf4; give format= if it is one of them"
+            + (hint if reading.name.endswith(".mat") else ""),
         )
-        raise reading.error("", known + (f" ({hint})" if hint else ""))
     from nonsmooth.recordings.readers.capstone_csv import looks_like_capstone
 
     plain = reading.columns is not None or reading.rate is not None or reading.axis != "time"
@@ -216,16 +196,11 @@ def _detect(data: bytes, reading: Reading) -> str:
 
 def _replace_units(reading: Reading) -> None:
     names, units = {trace.name for trace in reading.traces}, reading.units or {}
-    for name in set(reading.wraps or {}) - names - {reading.axis}:
-        raise reading.error("", f"wraps names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
     quantities = {trace.attrs.get("measurement", trace.name) for trace in reading.traces}
-    for name in units:
-        if name not in names | quantities | {reading.axis}:
-            raise reading.error("", f"units names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
-
-    def unit(trace: Trace) -> str:
-        given = units.get(trace.name, units.get(trace.attrs.get("measurement", "")))
-        return trace.unit if given is None else given
-
+    for option, allowed in (("wraps", names), ("units", names | quantities)):
+        for name in (getattr(reading, option) or {}).keys() - allowed - {reading.axis}:
+            there = names_of(sorted(names))
+            raise reading.error("", f"{option} names {name!r}, which is no channel; there are: {there}")
     if units:
-        reading.traces = [replace(trace, unit=unit(trace)) for trace in reading.traces]
+        of = [units.get(one.name, units.get(one.attrs.get("measurement", ""), one.unit)) for one in reading.traces]
+        reading.traces = [replace(trace, unit=unit) for trace, unit in zip(reading.traces, of, strict=True)]

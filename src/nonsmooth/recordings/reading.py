@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
@@ -56,26 +55,19 @@ class Remarks:
 
     def sentences(self) -> tuple[str, ...]:
         """All of them; channels of one run of which the same is to be said stand together, and so do many runs."""
-        alike: dict[tuple[str, ...], list[tuple[str, list[str], str]]] = {}
+        alike: dict[tuple[str, ...], list[tuple[str, str]]] = {}  # runs, each with its sentence
         for (run, text), channels in self._channels.items():
             kind = (re.sub(r"\d+", "#", text), *channels) if run else (run, text)
-            alike.setdefault(kind, []).append((run, channels, text))
+            each = list(dict.fromkeys(channels))
+            named = ", ".join(map(repr, each[:_NAMED])) + (f" and {len(each) - _NAMED} more" if each[_NAMED:] else "")
+            of = [f"run {run!r}"] * bool(run) + [f"channel{'s' if len(each) > 1 else ''} {named}"] * bool(each)
+            alike.setdefault(kind, []).append((run, f"{', '.join(of)}: {text}" if of else text))
         said: list[str] = []
         for group in alike.values():
-            if len(group) <= _ALIKE:
-                said += [_sentence(*one) for one in group]
-            else:
-                said.append(f"{_sentence(*group[0])} (and likewise {len(group) - 1} more runs, to {group[-1][0]!r})")
+            (_, first), (last, _), more = group[0], group[-1], len(group) - 1
+            few = [text for _, text in group]
+            said += few if more < _ALIKE else [f"{first} (and likewise {more} more runs, to {last!r})"]
         return tuple(said)
-
-
-def _sentence(run: str, channels: list[str], text: str) -> str:
-    channels = list(dict.fromkeys(channels))
-    named = ", ".join(map(repr, channels[:_NAMED]))
-    more = f" and {len(channels) - _NAMED} more" if len(channels) > _NAMED else ""
-    which = f"channel{'s' if len(channels) > 1 else ''} {named}{more}" if channels else ""
-    place = ", ".join(part for part in (f"run {run!r}" if run else "", which) if part)
-    return f"{place}: {text}" if place else text
 
 
 #: What instruments call the time column, lower case, in the languages their programs speak.
@@ -235,14 +227,14 @@ def needed(module: str, package: str, reading: Reading, extra: str = "experiment
 
 
 @contextmanager
-def readable(what: str, reading: Reading, place: str = "") -> Iterator[None]:
-    """Turn what a damaged file makes a library raise, almost anything, into a DataFileError."""
+def readable(done: str, reading: Reading, place: str = "") -> Iterator[None]:
+    """Turn what a damaged file makes a library raise, almost anything, into a DataFileError: it cannot be ``done``."""
     try:
         yield
     except DataFileError:
         raise
     except Exception as error:
-        message = f"cannot be read as {what}, it is damaged or cut short ({type(error).__name__}: {error})"
+        message = f"cannot be {done}, it is damaged or cut short ({type(error).__name__}: {error})"
         raise reading.error(place, message[:300]) from error
 
 
@@ -277,8 +269,7 @@ class Archive:
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             infos = self._zip.infolist()
-        # A damaged directory surfaces as almost any exception of zipfile.
-        except Exception as error:
+        except Exception as error:  # of a damaged directory almost any
             raise reading.error("", f"is not a whole ZIP archive ({error})") from error
         if len(infos) > _MAX_MEMBERS:
             raise reading.error("", f"holds {len(infos)} members; at most {_MAX_MEMBERS} are read")
@@ -298,19 +289,13 @@ class Archive:
             raise self._reading.error(name, "is encrypted; save the experiment without a password")
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise self._reading.error(name, f"is packed by method {info.compress_type}; expected stored or deflated")
-        try:
-            with self._zip.open(info) as opened:
-                while piece := opened.read(_PIECE):
-                    self._left -= len(piece)
-                    if self._left < 0:
-                        raise self._reading.error(
-                            name,
-                            f"unpacks to more than {self._limit} bytes, more than a file of {self._reading.size} bytes "
-                            "warrants; it may be made to exhaust memory",
-                        )
-                    yield piece
-        except DataFileError:
-            raise
-        # zipfile raises NotImplementedError for a compression or a version of the format that it does not know.
-        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, NotImplementedError) as error:
-            raise self._reading.error(name, f"cannot be unpacked, it is damaged or cut short ({error})") from error
+        with readable("unpacked", self._reading, name), self._zip.open(info) as opened:
+            while piece := opened.read(_PIECE):
+                self._left -= len(piece)
+                if self._left < 0:
+                    raise self._reading.error(
+                        name,
+                        f"unpacks to more than {self._limit} bytes, more than a file of {self._reading.size} bytes "
+                        "warrants; it may be made to exhaust memory",
+                    )
+                yield piece

@@ -101,8 +101,7 @@ def apparatus_of(given: Any, where: str) -> Mapping[str, Quantity]:
         check_keys(stated, ("value", "uncertainty"), f"{where}, {name}", "a key")
         if "value" not in stated:
             raise ValueError(f"{where}, {name}: needs `value`")
-        numbers = [real_number(stated.get(key, 0.0), f"{where}, {name}: {key}") for key in ("value", "uncertainty")]
-        quantity = Quantity(*numbers)
+        quantity = Quantity(**{key: real_number(one, f"{where}, {name}: {key}") for key, one in stated.items()})
         if quantity.value <= 0 or quantity.uncertainty < 0:
             raise ValueError(f"{where}, {name} = {value!r}: must be positive, an uncertainty zero or more")
         known[name] = quantity
@@ -222,12 +221,8 @@ class Session(Answering):
         """
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "a session", PROCEDURES.keys()))
-        found = []
-        for entry in self.entries:
-            if entry.procedure == procedure:
-                recording = self._recording(entry)
-                found += [RecordedRun(recording, run, settings) for run, settings in entry.runs]
-        return found
+        read = [(self._recording(entry), entry.runs) for entry in self.entries if entry.procedure == procedure]
+        return [RecordedRun(recording, *run) for recording, runs in read for run in runs]
 
     def _recording(self, entry: Entry) -> Recording:
         if entry.file in self._read:

@@ -104,7 +104,8 @@ class _Door:
         self.function, self.verb = function, function.__qualname__.removesuffix(".__init__")
         self.items = dict(own.parameters)
         rest = next((item for item in self.items.values() if item.kind is item.VAR_KEYWORD), None)
-        self.group = None if rest is None else _group(rest.annotation, function)
+        parts = () if rest is None else get_args(_evaluated(rest.annotation, function))
+        self.group = parts[0] if parts and is_group(parts[0]) else None  # of ``**options: Unpack[Group]``
         self.behind: _Door | None = getattr(of, "door", None)
         others = inspect.signature(of).parameters.values() if of else _parameters(self.group, defaults)
         self.shared = {item.name: item.default for item in others if item.name not in self.items}
@@ -227,12 +228,6 @@ def _evaluated(annotation: Any, function: Verb) -> Any:
         return eval(annotation, inspect.unwrap(function).__globals__) if isinstance(annotation, str) else annotation
     except NameError:
         return Any
-
-
-def _group(annotation: Any, function: Verb) -> Any:
-    """The group of ``**options: Unpack[Group]``."""
-    parts = get_args(_evaluated(annotation, function))
-    return parts[0] if parts and is_group(parts[0]) else None
 
 
 def _parameters(group: Any, defaults: Mapping[str, Any]) -> list[Parameter]:

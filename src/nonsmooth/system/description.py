@@ -31,7 +31,7 @@ from nonsmooth.system.symbolic.scalar import to_expression
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 from nonsmooth.system.symmetry import Symmetry, trace_symmetry
-from nonsmooth.system.transition import Band, Mode, Surface, Transition
+from nonsmooth.system.transition import Band, Mode, Surface
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.loads import Loads
@@ -65,7 +65,6 @@ class Description:
     plain: Callable[[], tuple[Traced, tuple[TracedSurface, ...]]] | None = field(
         default=None, compare=False, repr=False
     )  # without elements
-    relays: bool = False  # the elements are the surfaces that were given
     loads: Loads | None = None  # of a system with elements
     inputs: Mapping[str, Any] = field(default_factory=dict)  # the unit of each, with "smooth" where it is so
     written: Callable[[], Description] | None = field(default=None, compare=False, repr=False)
@@ -83,11 +82,10 @@ class Description:
 
     def written_out(self) -> Description:
         """The description with a mode for each combination of its elements' phases, made once."""
-        if self.written is None:
+        if self.written is None or self.loads is None:
             return self
         if "written out" not in self.variants:
-            found = self.written()
-            self.variants["written out"] = found if self.loads is None else found.with_loads(self.loads)
+            self.variants["written out"] = replace(self.written().with_loads(self.loads), ranges=self.ranges)
         written: Description = self.variants["written out"]
         return written
 
@@ -96,67 +94,46 @@ class Description:
         forces = {f"{name}_force": units[0] for name, units in loads.units(self.symbol_units).items()}
         return replace(self, loads=loads, outputs={**self.outputs, **forces})
 
-    def with_sliding(self, traced: Traced) -> Traced:
-        """Return the declared equations, or what they became, with their sliding modes."""
-        if not self.surfaces:
-            return traced
-        from nonsmooth.system.derived.sliding import slide
+    def refined(self, powers: Mapping[str, sp.Expr], energy: str, ranges: Sequence[tuple[sp.Expr, str]]) -> Description:
+        """Return the description with the powers of a mechanical system and the unit of their work, and with what must
+        not be negative."""
+        from nonsmooth.system.derived.loads import Loads
 
-        return slide(traced, self.surfaces, self.scale)
+        loads = self.loads or Loads((), dict(zip(self.traced.mode_names, self.traced.fields, strict=True)))
+        new = self.with_loads(replace(loads, powers=powers, energy=energy)) if powers else self
+        return replace(new, ranges=tuple(ranges), variants={}) if ranges else new
 
     @property
     def symbol_units(self) -> dict[sp.Symbol, str]:
         """Units of the symbols of states, parameters and memory; the time's is s where a state has a unit."""
         t = self.traced
-        units = dict(zip(t.u, self.states.values(), strict=True))
-        units |= {s: parameter.unit for s, parameter in zip(t.p, self.parameters.values(), strict=True)}
-        units |= {s: unit for s, (_, unit) in zip(t.m, self.memory.values(), strict=True)}
-        return units | {t.t: "s" if any(self.states.values()) else ""}
-
-    @property
-    def symbol_names(self) -> dict[sp.Symbol, str]:
-        """Names of the symbols in text: ``t``, ``u.x``, ``p.k`` (memory is read as ``p.`` too)."""
-        t = self.traced
-        names = {t.t: "t"}
-        names |= {s: f"u.{name}" for s, name in zip(t.u, t.state_names, strict=True)}
-        names |= {s: f"p.{name}" for s, name in zip(t.p, t.parameter_names, strict=True)}
-        return names | {s: f"p.{name}" for s, name in zip(t.m, t.memory_names, strict=True)}
+        units = [*self.states.values(), *(parameter.unit for parameter in self.parameters.values())]
+        units += [unit for _, unit in self.memory.values()]
+        time = "s" if any(self.states.values()) else ""
+        return {**dict(zip((*t.u, *t.p, *t.m), units, strict=True)), t.t: time}
 
 
-def describe(
-    *,
-    name: str,
-    states: Mapping[str, str] | Sequence[str],
-    parameters: Mapping[str, Any],
-    modes: Mapping[str, Callable[..., Any] | Mode],
-    indicators: Mapping[str, Callable[..., Any]] | None,
-    transitions: Sequence[Transition | Surface],
-    memory: Mapping[str, Any] | None,
-    outputs: Mapping[str, Any] | None,
-    symmetry: Any,
-    scale: Mapping[str, float] | None,
-    period: Any,
-    bands: Mapping[str, Band] | None,
-    elements: Any = None,
-    impacts: str = "simultaneous",
-    inputs: Mapping[str, Any] | Sequence[str] | None = None,
-    written: bool = False,
-) -> Description:
-    """Check everything, call each function once with symbols, and return the description.
+def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
+    """Check all arguments of a system, call each function once with symbols, and return the description.
 
     Elements that decide together are ``written`` out as modes where that is asked for, or has to be.
     """
-    asked = dict(locals())
-    given = asked | {"states": _units(states, "states", name), "indicators": indicators or {}, "outputs": outputs or {}}
-    given["inputs"] = read_inputs(_units(inputs or {}, "inputs", name, raw=True), name)
+    name = asked["name"]
+    given = {**asked, "written": written, "states": _units(asked["states"], "states", name)}
+    given |= {key: asked[key] or {} for key in ("indicators", "outputs", "bands")}
+    given["inputs"] = read_inputs(_units(asked["inputs"] or {}, "inputs", name, raw=True), name)
     _check_kinds(given)
+    given["modes"] = {key: mode if isinstance(mode, Mode) else Mode(mode) for key, mode in given["modes"].items()}
+    given["outputs"] = {key: _output(key, one) for key, one in given["outputs"].items()}
     own = given["states"]
     driven = [key for states in input_states(given["inputs"]).values() for key in states]
     if driven:
         check_names({"state": own, "input": driven}, name)
         given |= with_inputs(given)
-    known = {key: Parameter.read(key, one) for key, one in parameters.items()}
-    remembered = {key: _memory(key, one) for key, one in _units(memory or {}, "memory", name, raw=True).items()}
+    known = {key: Parameter.read(key, one) for key, one in given["parameters"].items()}
+    remembered = {
+        key: _memory(key, one) for key, one in _units(asked["memory"] or {}, "memory", name, raw=True).items()
+    }
     symbols = Symbols(
         name,
         given["states"],
@@ -165,15 +142,13 @@ def describe(
         tuple(driven),
     )
     values = {symbol: known[key].value for key, symbol in symbols.p.items()}
-    given |= {"scale": _scale(scale, given["states"], name)}
+    given |= {"scale": _scale(given["scale"], given["states"], name)}
     made = _with_elements(symbols, given, values)
     given = given | made  # `plain` goes on with what was given
-    shown = {key: _output(key, one) for key, one in given["outputs"].items()}
-    bands = dict(bands or {})
+    shown, bands, symmetry = given["outputs"], given["bands"], given["symmetry"]
     for key, band in bands.items():
         if not isinstance(band, Band):
             raise SystemDefinitionError(f"{name!r}: the band of {key!r} must be an ns.Band, not {band!r}")
-    slid = [(item, sliding_mode(item, given["transitions"])) for item in _surfaces(given["transitions"])]
     check_names(
         {
             "state": own,
@@ -184,22 +159,20 @@ def describe(
             "indicator": given["indicators"],
             "output": shown,
             "memory of a band": sorted({key for band in bands.values() for key in (band.write or {})}),
-            "sliding mode": [mode for _, mode in slid],
+            "sliding mode": [mode for _, mode in _slid(given["transitions"])],
         },
         name,
     )
-    traced, surfaces = _traced(symbols, given, shown)
+    traced, surfaces = _traced(symbols, given)
     _check_phases(traced)
-    traced, explicit = _with_period(traced, symbols, values, period)
+    traced, explicit = _with_period(traced, symbols, values, given["period"])
     if symmetry is not None:
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
-    if "patterns" in made:
-        traced = made["patterns"].bind(traced)
-    elif made.get("decider") is not None:
-        traced = made["decider"].decides(traced, made["kinds"], made["asked"])
+    if made.get("bind") is not None:
+        traced = made["bind"](traced)
     units_out = {key: unit for key, (_, unit) in shown.items()}
     loads = None
-    if elements:
+    if given["elements"]:
         from nonsmooth.system.derived.loads import loads_of
 
         loads = loads_of(made["make"])
@@ -219,10 +192,9 @@ def describe(
         ranges=tuple(made.get("ranges", ())),
         limits=tuple(made.get("limits", ())),
         plain=made.get("plain"),
-        relays=made.get("relays", False),
         loads=loads,
         inputs=given["inputs"],
-        written=partial(describe, **{**asked, "written": True}) if made.get("also written") else None,
+        written=partial(describe, asked, written=True) if made.get("also written") else None,
     )
     return description if loads is None else description.with_loads(loads)
 
@@ -256,24 +228,21 @@ def _with_elements(symbols: Symbols, given: Mapping[str, Any], values: Mapping[s
     else:
         return {}
     ranges = [*(relays.ranges if relays else ()), *made["ranges"]]
-    return made | {"ranges": ranges, "relays": relays is not None, "plain": partial(_traced, symbols, given)}
+    return made | {"ranges": ranges, "plain": partial(_traced, symbols, given)}
 
 
-def _traced(
-    symbols: Symbols, given: Mapping[str, Any], shown: Mapping[str, Any] | None = None
-) -> tuple[Traced, tuple[TracedSurface, ...]]:
+def _traced(symbols: Symbols, given: Mapping[str, Any]) -> tuple[Traced, tuple[TracedSurface, ...]]:
     """The equations as they are given, elements put aside, and their surfaces."""
-    shown = {key: _output(key, one) for key, one in given["outputs"].items()} if shown is None else shown
     kinds = {key: _mode(mode, key, given["states"]) for key, mode in given["modes"].items()}
     transitions = given["transitions"]
-    traced = trace_system(given["name"], symbols, kinds, dict(given["indicators"]), transitions, shown)
-    slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
-    return traced, tuple(trace_surface(item, mode, traced, symbols) for item, mode in slid)
+    traced = trace_system(given["name"], symbols, kinds, dict(given["indicators"]), transitions, given["outputs"])
+    return traced, tuple(trace_surface(item, mode, traced, symbols) for item, mode in _slid(transitions))
 
 
-def _surfaces(transitions: Any) -> list[Surface]:
-    """The surfaces among what may yet turn out to be no list."""
-    return [item for item in transitions if isinstance(item, Surface)] if isinstance(transitions, Iterable) else []
+def _slid(transitions: Any) -> list[tuple[Surface, str]]:
+    """The surfaces among what may yet turn out to be no list, each with the name of its sliding mode."""
+    some = transitions if isinstance(transitions, Iterable) else ()
+    return [(item, sliding_mode(item, some)) for item in some if isinstance(item, Surface)]
 
 
 def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, Any]:
@@ -312,8 +281,7 @@ def _output(key: str, given: Any) -> tuple[Any, str]:
     return function, unit
 
 
-def _mode(given: Any, key: str, states: Mapping[str, str]) -> tuple[Callable[..., Any], tuple[str, ...]]:
-    mode = given if isinstance(given, Mode) else Mode(given)
+def _mode(mode: Mode, key: str, states: Mapping[str, str]) -> tuple[Callable[..., Any], tuple[str, ...]]:
     own = tuple(states) if mode.states is None else tuple(mode.states)
     for name in own:
         if name not in states:

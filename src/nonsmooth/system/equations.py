@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +20,8 @@ from nonsmooth.system.transition import Band, Surface, Transition, read_conditio
 class TracedSurface:
     """A Filippov surface in integers: where ``indicator`` is negative the mode is ``below``.
 
-    ``mode`` names the sliding mode; ``static`` is the ratio of the static value to the kinetic one, ``field`` what is
-    given in place of Filippov's field (None: not given)."""
+    ``mode`` names the sliding mode ("": after its indicators); ``static`` is the ratio of the static value to the
+    kinetic one, ``field`` what is given in place of Filippov's field (None: not given)."""
 
     indicator: int
     below: int
@@ -51,22 +51,17 @@ def trace_system(
     outputs: Mapping[str, tuple[Any, str]],
 ) -> Traced:
     """Trace everything but the period. ``modes``: name -> (function, its states); ``outputs``: name -> (f, unit)."""
-    time, p = Scalar(symbols.t), symbols.parameters()
     moving = {symbols.t, *symbols.u.values()}
     everything = tuple(symbols.u)
     fields, lacking = [], []
     for key, (function, own) in modes.items():
-        what = f"the vector field of mode {key!r}"
-        part = call_vector(function, (time, symbols.states(own, f"mode {key!r}"), p), own, what)
-        for entry in part:
-            refuse_corners(entry, moving, what)
-        whole = dict(zip(own, part, strict=True))
-        fields.append(tuple(whole.get(state, sp.Integer(0)) for state in everything))
+        arguments = symbols.arguments(own, f"mode {key!r}")
+        fields.append(_states(function, arguments, own, f"the vector field of mode {key!r}", everything, moving))
         lacking.append(tuple(state not in own for state in everything))
     surfaces_of = []
     for key, function in indicators.items():
         what = f"indicator {key!r}"
-        expression = call_scalar(function, (time, symbols.states(), p), what)
+        expression = call_scalar(function, symbols.arguments(), what)
         refuse_corners(expression, moving, what)
         if not isinstance(function, KnownFunction) and not expression.free_symbols & set(symbols.u.values()):
             raise SystemDefinitionError(
@@ -85,7 +80,7 @@ def trace_system(
         if isinstance(item, Surface):
             jumps += _surface_jumps(item, owned, indicators)
         elif isinstance(item, Transition):
-            jumps.append(_jump(item, symbols, time, owned, indicators, surfaces_of))
+            jumps.append(_jump(item, symbols, owned, indicators, surfaces_of))
         else:
             raise SystemDefinitionError(
                 f"{name!r}: `transitions` is a list of ns.Transition and ns.Surface, not {shortened(item)}; "
@@ -93,13 +88,7 @@ def trace_system(
             )
     return Traced(
         name=name,
-        t=symbols.t,
-        u=tuple(symbols.u.values()),
-        p=tuple(symbols.p.values()),
-        m=tuple(symbols.m.values()),
-        state_names=everything,
-        parameter_names=tuple(symbols.p),
-        memory_names=tuple(symbols.m),
+        **symbols.of_traced(),
         mode_names=tuple(modes),
         indicator_names=tuple(indicators),
         output_names=tuple(outputs),
@@ -107,9 +96,25 @@ def trace_system(
         lacking=tuple(lacking),
         indicators=tuple(surfaces_of),
         transitions=tuple(jumps),
-        outputs=tuple(_trace_output(k, f, symbols, time, owned) for k, (f, _) in outputs.items()),
+        outputs=tuple(_trace_output(k, f, symbols, owned) for k, (f, _) in outputs.items()),
         period=None,
     )
+
+
+def _states(
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
+    own: tuple[str, ...],
+    what: str,
+    every: Iterable[str],
+    moving: set[sp.Symbol],
+) -> tuple[sp.Expr, ...]:
+    """One expression for every state, 0 for those that a function has not among its ``own``; none has a corner in what
+    is ``moving``."""
+    whole = dict(zip(own, call_vector(function, arguments, own, what), strict=True))
+    for entry in whole.values():
+        refuse_corners(entry, moving, what)
+    return tuple(whole.get(state, sp.Integer(0)) for state in every)
 
 
 def _mode_index(name: str, label: str, modes: Mapping[str, Any]) -> int:
@@ -128,18 +133,14 @@ def _surface_jumps(
         )
     if set(modes[item.below]) != set(modes[item.above]):
         raise SystemDefinitionError(f"{item.label}: both modes must have the same states")
-    i = list(indicators).index(item.indicator)
+    i, names = list(indicators).index(item.indicator), list(modes)
     return [
-        TracedTransition(
-            below, above, (TracedCondition(i, 1),), contact=below == 0, label=f"{item.below} -> {item.above}"
-        ),
-        TracedTransition(
-            above, below, (TracedCondition(i, -1),), contact=above == 0, label=f"{item.above} -> {item.below}"
-        ),
+        TracedTransition(a, b, (TracedCondition(i, sign),), contact=a == 0, label=f"{names[a]} -> {names[b]}")
+        for a, b, sign in ((below, above, 1), (above, below, -1))
     ]
 
 
-def sliding_mode(item: Surface, transitions: Sequence[Transition | Surface]) -> str:
+def sliding_mode(item: Surface, transitions: Iterable[Transition | Surface]) -> str:
     """Name of the mode in which motion slides along a surface."""
     alike = [one for one in transitions if isinstance(one, Surface) and one.indicator == item.indicator]
     default = f"{item.indicator}_sliding" + (f"_{item.below}_{item.above}" if len(alike) > 1 else "")
@@ -151,7 +152,7 @@ def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) ->
     modes, moving = traced.mode_names, {symbols.t, *symbols.u.values()}
     below = modes.index(item.below)
     own = tuple(n for n, gone in zip(traced.state_names, traced.lacking[below], strict=True) if not gone)
-    arguments = Scalar(symbols.t), symbols.states(own, f"mode {item.below!r}"), symbols.parameters()
+    arguments = symbols.arguments(own, f"mode {item.below!r}")
     static, field = item.static, None
     if callable(static):
         static = call_scalar(static, arguments, f"`static` of {item.label}")
@@ -159,11 +160,7 @@ def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) ->
     elif static is not None:
         static = to_expression(static)
     if item.field is not None:
-        part = call_vector(item.field, arguments, own, f"the field of {item.label}")
-        for entry in part:
-            refuse_corners(entry, moving, f"the field of {item.label}")
-        whole = dict(zip(own, part, strict=True))
-        field = tuple(whole.get(state, sp.Integer(0)) for state in traced.state_names)
+        field = _states(item.field, arguments, own, f"the field of {item.label}", traced.state_names, moving)
     i = traced.indicator_names.index(item.indicator)
     return TracedSurface(i, below, modes.index(item.above), mode, static, field)
 
@@ -171,7 +168,6 @@ def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) ->
 def _jump(
     item: Transition,
     symbols: Symbols,
-    time: Any,
     modes: Mapping[str, tuple[str, ...]],
     indicators: Mapping[str, Any],
     expressions: Sequence[sp.Expr],
@@ -190,12 +186,10 @@ def _jump(
                 f"{label}: the indicator {order[row.indicator]!r} involves the state {hidden[symbol]!r}, which mode "
                 f"{item.source!r} does not have"
             )
-    u, p = symbols.states(before, f"mode {item.source!r}"), symbols.parameters()
+    arguments = symbols.arguments(before, f"mode {item.source!r}")
     reset = None
     if item.reset is not None:
-        part = call_vector(item.reset, (time, u, p), after, f"the reset of {label}")
-        whole = dict(zip(after, part, strict=True))
-        reset = tuple(whole.get(state, sp.Integer(0)) for state in symbols.u)
+        reset = _states(item.reset, arguments, after, f"the reset of {label}", symbols.u, set())
     elif not set(after) <= set(before):
         new = [state for state in after if state not in before]
         raise SystemDefinitionError(
@@ -206,7 +200,7 @@ def _jump(
     for key, function in (item.write or {}).items():
         if key not in symbols.m:
             raise SystemDefinitionError(f"{label}: {unknown(key, 'memory', 'this system', list(symbols.m))}")
-        value = call_scalar(function, (time, u, p), f"what {label} writes to {key!r}")
+        value = call_scalar(function, arguments, f"what {label} writes to {key!r}")
         writes.append((list(symbols.m).index(key), value))
     contact = item.begins_contact(next(iter(modes)))
     at = _phase(item.at, label, symbols) if callable(item.at) else item.at
@@ -226,10 +220,7 @@ def _phase(given: Callable[..., Any], label: str, symbols: Symbols) -> float | s
     return phase
 
 
-def _trace_output(
-    key: str, given: Any, symbols: Symbols, time: Any, modes: Mapping[str, tuple[str, ...]]
-) -> tuple[sp.Expr, ...]:
-    p = symbols.parameters()
+def _trace_output(key: str, given: Any, symbols: Symbols, modes: Mapping[str, tuple[str, ...]]) -> tuple[sp.Expr, ...]:
     if isinstance(given, Mapping):
         for mode in given:
             if mode not in modes:
@@ -237,10 +228,10 @@ def _trace_output(
         if missing := [mode for mode in modes if mode not in given]:
             raise SystemDefinitionError(f"output {key!r} is not given in mode {missing[0]!r}")
         return tuple(
-            call_scalar(given[mode], (time, symbols.states(own, f"mode {mode!r}"), p), f"output {key!r} in {mode!r}")
+            call_scalar(given[mode], symbols.arguments(own, f"mode {mode!r}"), f"output {key!r} in {mode!r}")
             for mode, own in modes.items()
         )
-    expression = call_scalar(given, (time, symbols.states(), p), f"output {key!r}")
+    expression = call_scalar(given, symbols.arguments(), f"output {key!r}")
     for mode, own in modes.items():
         if expression.free_symbols & {symbol for state, symbol in symbols.u.items() if state not in own}:
             raise SystemDefinitionError(

@@ -62,9 +62,7 @@ def with_inputs(given: Mapping[str, Any]) -> dict[str, Any]:
     def kept(function: Callable[..., Any]) -> Callable[..., Any]:
         return _longer(function, lambda p: [p[key] for key in more])
 
-    def of_mode(mode: Any) -> Any:
-        if not isinstance(mode, Mode):
-            return moved(mode)
+    def of_mode(mode: Mode) -> Mode:
         return Mode(moved(mode.field), states=None if mode.states is None else [*mode.states, *more])
 
     def of_transition(item: Any) -> Any:
@@ -74,10 +72,10 @@ def with_inputs(given: Mapping[str, Any]) -> dict[str, Any]:
             return replace(item, field=moved(item.field))
         return item
 
-    modes, transitions = given["modes"], given["transitions"]
+    transitions = given["transitions"]
     return {
         "states": given["states"] | more,
-        "modes": {key: of_mode(mode) for key, mode in modes.items()} if isinstance(modes, Mapping) else modes,
+        "modes": {key: of_mode(mode) for key, mode in given["modes"].items()},
         "transitions": [*map(of_transition, transitions)] if isinstance(transitions, Sequence) else transitions,
     }
 

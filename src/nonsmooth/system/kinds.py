@@ -128,7 +128,9 @@ def reader_of(what: Any) -> Reader:
     if origin is tuple:
         return _two_numbers
     if origin is Mapping and parts[1] is not Any:
-        return partial(_mapping, reader=reader_of(parts[1]))
+        of = reader_of(parts[1])
+        entries = partial(_instance, kind=Mapping, words="a mapping")
+        return lambda value, name: {key: of(one, f"{name}[{key!r}]") for key, one in entries(value, name).items()}
     if origin is Sequence:
         return partial(_sequence, reader=reader_of(parts[0]), words=in_words(what), names=parts[0] is str)
     if origin is Literal:
@@ -169,10 +171,6 @@ def _rising(value: Any, name: str) -> tuple[float, float]:
     if not low < high:
         raise ValueError(f"{name} = {shortened(value)}: the first end must be below the second")
     return low, high
-
-
-def _mapping(value: Any, name: str, reader: Reader) -> dict[Any, Any]:
-    return {key: reader(one, f"{name}[{key!r}]") for key, one in _instance(value, name, Mapping, "a mapping").items()}
 
 
 def _sequence(value: Any, name: str, reader: Reader, words: str, names: bool) -> Sequence[Any]:
@@ -285,13 +283,8 @@ def float_array(values: Any, name: str) -> FloatArray:
 
 
 def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
-    """The values of a parameter that is varied, as an array.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A parameter that does not exist; values that are no list of finite numbers, each there once.
-    """
+    """The values of a parameter that is varied, as an array; ValueError, TypeError for one that does not exist, and for
+    what is no list of finite numbers, each there once."""
     if parameter not in system.values:
         system.with_parameters({parameter: 0.0})  # raises with the names there are
     numbers = float_array(values, f"values of {parameter!r}")

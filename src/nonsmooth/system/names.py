@@ -78,15 +78,8 @@ RESERVED = frozenset(
 
 
 def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
-    """Check that all names are identifiers, not reserved, and different across all ``groups``.
-
-    Parameters
-    ----------
-    groups : mapping of str to iterable of str
-        What the names are ("state", "parameter", ...) and the names.
-    system : str
-        Name of the system, for the message.
-    """
+    """Check that all names are identifiers, not reserved, and different across all ``groups``: the names by what they
+    are ("state", "parameter", ...)."""
     seen: dict[str, str] = {}
     extremes = {f"{o}_{which}": o for o in groups.get("output", ()) for which in ("maximum", "minimum")}
     for what, names in groups.items():

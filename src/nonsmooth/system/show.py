@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import sympy as sp
@@ -14,17 +15,6 @@ from nonsmooth.system.transition import condition_text
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
     from nonsmooth.system.system import System
-
-
-def _plain(traced: Traced) -> dict[sp.Symbol, str]:
-    names = {traced.t: "t"}
-    for symbols, known in (
-        (traced.u, traced.state_names),
-        (traced.p, traced.parameter_names),
-        (traced.m, traced.memory_names),
-    ):
-        names |= dict(zip(symbols, known, strict=True))
-    return names
 
 
 def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -> str:
@@ -65,18 +55,18 @@ def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
     """Headings and texts: states, parameters, equations by mode, indicators, transitions, period."""
     patterns, loads = system.traced.patterns, system._description.loads
     traced = system.traced if patterns is None else patterns.plain
-    names = _plain(traced)
+    names = traced.named()
     lines: list[tuple[str, str]] = []
     short = loads is not None and bool(loads.elements) and not system.is_smoothed and not verbose
 
-    def unit(text: str) -> str:
-        return f" [{text}]" if text else ""
+    def listed(units: Mapping[str, str]) -> str:
+        return ", ".join(f"{name} [{unit}]" if unit else name for name, unit in units.items())
 
-    lines.append(("states", ", ".join(f"{name}{unit(u)}" for name, u in system.states.items())))
+    lines.append(("states", listed(system.states)))
     values = (f"{k} = {v.value:.12g}{' ' * bool(v.unit)}{v.unit}" for k, v in system.parameters.items())
     lines.append(("parameters", ", ".join(values) or "none"))
     if system.memory:
-        lines.append(("memory", ", ".join(f"{name}{unit(u)}" for name, u in system.memory.items())))
+        lines.append(("memory", listed(system.memory)))
     modes = traced.mode_names, traced.fields, traced.lacking
     if short and loads is not None:
         modes = tuple(loads.fields), tuple(loads.fields.values()), len(loads.fields) * (traced.lacking[0],)
@@ -111,7 +101,7 @@ def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
         count = f"{len(system.modes)}, with {len(system.declared.transitions)} transitions"
         lines.append(("modes", f"{count}: print(system.summary(verbose=True)) shows them"))
     if system.outputs:
-        lines.append(("outputs", ", ".join(f"{name}{unit(u)}" for name, u in system.outputs.items())))
+        lines.append(("outputs", listed(system.outputs)))
     lines.append(("period", _period(system, names)))
     if system.is_smoothed:
         lines.append(("smoothing", f"eta = {system.eta}, {system.band} band"))
@@ -130,10 +120,8 @@ def latex(system: System) -> str:
     """Return the equations as an ``align*`` environment: fields by mode, indicators, transitions."""
     system.refuse_patterns("to_latex")
     traced, parameters = system.traced, system.parameters
-    names = {traced.t: "t"}
-    names |= {s: latex_name(name) for s, name in zip(traced.u, traced.state_names, strict=True)}
-    names |= {s: parameters[name].symbol for s, name in zip(traced.p, traced.parameter_names, strict=True)}
-    names |= {s: latex_name(name) for s, name in zip(traced.m, traced.memory_names, strict=True)}
+    names = {symbol: latex_name(name) for symbol, name in traced.named().items()}
+    names |= dict(zip(traced.p, (one.symbol for one in parameters.values()), strict=True))
 
     def write(expression: sp.Expr) -> str:
         return str(sp.latex(expression, symbol_names=names))

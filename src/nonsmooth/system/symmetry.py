@@ -12,7 +12,6 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, unknown
 from nonsmooth.system.kinds import real_number
-from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import call_vector
 
@@ -30,24 +29,15 @@ class Symmetry:
 
 
 def trace_symmetry(given: Any, traced: Traced, symbols: Symbols, values: Mapping[sp.Symbol, float]) -> Symmetry:
-    """Trace ``(map, shift)`` or ``(map, shift, {mode: mode})`` and check it on the vector fields.
-
-    Parameters
-    ----------
-    given : tuple
-        ``map(u)`` or ``map(t, u, p)`` returns the mapped state; ``shift`` in periods; modes that change places.
-    traced : Traced
-    symbols : Symbols
-    values : mapping of Symbol to float
-        The parameters' values, for the check.
-    """
+    """Trace ``(map, shift)`` or ``(map, shift, {mode: mode})`` and check it on the vector fields, at some ``values``:
+    ``map(u)`` or ``map(t, u, p)``, the shift in periods, modes that change places."""
     if not isinstance(given, (tuple, list)) or len(given) not in (2, 3) or not callable(given[0]):
         raise SystemDefinitionError(f"`symmetry` is (map, shift) or (map, shift, modes), not {given!r}")
     try:
         short = len(inspect.signature(given[0]).parameters) == 1
     except (TypeError, ValueError):
         short = False
-    arguments = (symbols.states(),) if short else (Scalar(symbols.t), symbols.states(), symbols.parameters())
+    arguments = (symbols.states(),) if short else symbols.arguments()
     image = call_vector(given[0], arguments, traced.state_names, "the map of `symmetry`")
     shift = real_number(given[1], "the shift of `symmetry`")
     if shift and traced.period is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -20,11 +21,8 @@ from nonsmooth.system.symmetry import Symmetry
 from nonsmooth.system.text import read_system, write_system
 from nonsmooth.system.transition import Band, Mode, Surface, Transition
 from nonsmooth.system.variant import (
-    SHARP,
     Derivatives,
     Variant,
-    changed_values,
-    parameter_rows,
     smoothed_values,
     variant_of,
 )
@@ -133,25 +131,9 @@ class System(Answering):
         inputs: Mapping[str, str | tuple[str, str]] | Sequence[str] | None = None,
         name: str = "system",
     ) -> None:
-        description = describe(
-            name=name,
-            states=states,
-            parameters=parameters,
-            modes=modes,
-            indicators=indicators,
-            transitions=transitions,
-            memory=memory,
-            outputs=outputs,
-            symmetry=symmetry,
-            scale=scale,
-            period=period,
-            bands=bands,
-            elements=elements,
-            impacts=impacts,
-            inputs=inputs,
-        )
+        description = describe({key: one for key, one in locals().items() if key != "self"})
         values = {key: parameter.value for key, parameter in description.parameters.items()}
-        self._set(description, values, variant_of(description, SHARP))
+        self._set(description, values, variant_of(description))
         self._variant.domain.check(values)
 
     def _set(self, description: Description, values: dict[str, float], variant: Variant) -> Self:
@@ -169,6 +151,10 @@ class System(Answering):
     def _make(cls, description: Description, values: dict[str, float], variant: Variant) -> Self:
         return object.__new__(cls)._set(description, values, variant)
 
+    def _of(self, description: Description) -> Self:
+        """The same with another description, at the same values."""
+        return self._make(description, dict(self.values), variant_of(description))
+
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
 
@@ -185,8 +171,8 @@ class System(Answering):
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Parameters with present value, unit and symbol; a smoothed system has ``eta`` at the end."""
-        units, symbols = self._variant.units, self._variant.symbols
-        return MappingProxyType({key: Parameter(now, units[key], symbols[key]) for key, now in self.values.items()})
+        known = self._variant.parameters
+        return MappingProxyType({key: replace(known[key], value=now) for key, now in self.values.items()})
 
     @property
     def modes(self) -> tuple[str, ...]:
@@ -234,7 +220,7 @@ class System(Answering):
 
     def refuse_patterns(self, verb: str) -> None:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
-        self._variant.refuse_patterns(self.name, verb)
+        self._variant.refuse_patterns(verb)
 
     # Numbers
 
@@ -252,7 +238,7 @@ class System(Answering):
 
     def period(self) -> float | None:
         """Return the forcing period at the present values of the parameters; None where there is none."""
-        return self._variant.period_at(self.values, self.values)
+        return self.period_at(self.values)
 
     def period_at(self, values: Mapping[str, float] | Sequence[float] | np.ndarray) -> float | None:
         """Return the forcing period at other values: a mapping (others stay), or a vector in declared order."""
@@ -266,7 +252,7 @@ class System(Answering):
         ValueError, SystemDefinitionError
             An unknown name, a value that is not finite, or one the equations do not allow.
         """
-        return parameter_rows(self._variant, self.values, self.name, columns)
+        return self._variant.rows(self.values, columns)
 
     # Copies
 
@@ -288,8 +274,7 @@ class System(Answering):
         SystemDefinitionError
             A value the equations do not allow, such as a mass of zero.
         """
-        new = changed_values(self._variant, self.values, self.name, given, values)
-        return self._make(self._description, new, self._variant)
+        return self._make(self._description, self._variant.changed(self.values, given, values), self._variant)
 
     def written_out(self) -> Self:
         """Return the same system with all its modes, indicators and transitions as expressions.
@@ -299,9 +284,7 @@ class System(Answering):
         of them out by itself; here they are to be looked at. Many elements take seconds.
         """
         description = self._description.written_out()
-        if description is self._description:
-            return self
-        return self._make(description, dict(self.values), variant_of(description, SHARP))
+        return self if description is self._description else self._of(description)
 
     def as_solved_by(self, options: Mapping[str, Any]) -> Self:
         """Return the system as the options of a verb need it: written out for a series, a step or a ramp."""
@@ -329,7 +312,7 @@ class System(Answering):
         ------
         SystemDefinitionError
             Transitions with a reset (impacts) or at a time, hysteresis, static friction above the kinetic one, or bands
-            that overlap: the pair is named.
+            that overlap without crossing, as those of three regions do: the pair is named.
 
         See Also
         --------

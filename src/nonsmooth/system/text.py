@@ -7,25 +7,23 @@ checks as what a user writes, because it is handed to them as functions that ret
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.description import Description
-from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.inputs import input_states
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import Scalar
-from nonsmooth.system.symbolic.traced import Traced, TracedCondition
+from nonsmooth.system.symbolic.traced import TracedCondition
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols
 from nonsmooth.system.transition import Band, Mode, Surface, Transition, condition_text
-from nonsmooth.system.variant import variant_of
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.loads import Load, Loads
+    from nonsmooth.system.derived.loads import Load
     from nonsmooth.system.system import System
 
 _FORMAT = "nonsmooth system"
@@ -73,137 +71,109 @@ def _pieces(
 
 
 def _content(d: Description) -> dict[str, Any]:
-    elements = d.traced.patterns or d.traced.decider
-    t, surfaces, names = d.traced, d.surfaces, d.symbol_names
-    if t.decider is not None and d.plain is not None:
-        t, surfaces = d.plain()
+    """A system with elements as it was given: its equations without them, and the elements; what it has not is left
+    out."""
+    from nonsmooth.system.derived.expressions import SPEED
+
+    t, surfaces = (d.traced, d.surfaces) if d.plain is None else d.plain()
+    names = {**d.traced.named("u.", "p."), SPEED: "speed"}
 
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
+
+    def states(vector: Sequence[sp.Expr], mode: int) -> dict[str, str]:
+        own = zip(t.state_names, vector, t.lacking[mode], strict=True)
+        return {state: text(e) for state, e, gone in own if not gone}
 
     upward = {(s.below, s.above, (TracedCondition(s.indicator, 1),)): s for s in surfaces}
     downward = {(s.above, s.below, (TracedCondition(s.indicator, -1),)) for s in surfaces}
     transitions: list[dict[str, Any]] = []
     for jump in t.transitions:
-        crossing = (jump.source, jump.target, jump.rows)
+        entry: dict[str, Any]
+        crossing, at = (jump.source, jump.target, jump.rows), jump.at
         if crossing in downward:  # the second half of a surface
             continue
         if crossing in upward:
-            transitions.append(_surface_content(upward[crossing], t, names))
-            continue
-        entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
-        if jump.at is None:
-            rows = [(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows]
-            entry["when"] = condition_text(rows)
+            surface = upward[crossing]
+            entry = {
+                "surface": t.indicator_names[surface.indicator],
+                "below": t.mode_names[surface.below],
+                "above": t.mode_names[surface.above],
+                "mode": surface.mode,
+                "static": None if surface.static is None else text(surface.static),
+                "field": None if surface.field is None else states(surface.field, surface.below),
+            }
         else:
-            entry["at"] = float(jump.at) if isinstance(jump.at, int | float) else text(jump.at)
-        if jump.reset is not None:
-            own = t.lacking[jump.target]
-            entry["reset"] = {s: text(e) for s, e, gone in zip(t.state_names, jump.reset, own, strict=True) if not gone}
-        if jump.writes:
-            entry["write"] = {t.memory_names[i]: text(value) for i, value in jump.writes}
-        if jump.contact != (jump.source == 0 or jump.reset is not None):
-            entry["contact"] = jump.contact
-        transitions.append(entry)
-    modes = {}
-    for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
-        modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
-    known = {} if elements is None or d.relays else elements.make.described()
-    indicators = {} if t.patterns is not None else dict(zip(t.indicator_names, map(text, t.indicators), strict=True))
-    content: dict[str, Any] = {
-        "format": _FORMAT,
-        "version": _VERSION,
-        "name": d.name,
-        "states": dict(d.states),
-        "scale": dict(d.scale),
-        "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
-        "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
-        "modes": modes,
-        "indicators": indicators,
-        "transitions": transitions,
-        "outputs": {
-            k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
-            for k, row in zip(t.output_names, t.outputs, strict=True)
-        },
-    }
-    if d.inputs:
-        content["inputs"] = dict(d.inputs)
-    if d.traced.period is not None:
-        content["period"] = text(d.traced.period)
-    if d.symmetry is not None:
-        content["symmetry"] = {
-            "map": {s: text(e) for s, e in zip(t.state_names, d.symmetry.map, strict=True)},
-            "shift": d.symmetry.shift,
-            "modes": {d.traced.mode_names[i]: d.traced.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
+            rows = [(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows]
+            usual = jump.source == 0 or jump.reset is not None
+            entry = {
+                "source": t.mode_names[jump.source],
+                "target": t.mode_names[jump.target],
+                "when": condition_text(rows) if at is None else None,
+                "at": at if at is None else float(at) if isinstance(at, int | float) else text(at),
+                "reset": None if jump.reset is None else states(jump.reset, jump.target),
+                "write": {t.memory_names[i]: text(value) for i, value in jump.writes} or None,
+                "contact": None if jump.contact == usual else jump.contact,
+            }
+        transitions.append(_known(entry))
+    loads, patterns, symmetry = d.loads, d.traced.patterns, d.symmetry
+    return _known(
+        {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "name": d.name,
+            "states": dict(d.states),
+            "scale": dict(d.scale),
+            "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
+            "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
+            "modes": {
+                mode: states(field, i) for i, (mode, field) in enumerate(zip(t.mode_names, t.fields, strict=True))
+            },
+            "indicators": dict(zip(t.indicator_names, map(text, t.indicators), strict=True)),
+            "transitions": transitions,
+            "outputs": {
+                k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
+                for k, row in zip(t.output_names, t.outputs, strict=True)
+            },
+            "inputs": dict(d.inputs) or None,
+            "period": None if d.traced.period is None else text(d.traced.period),
+            "symmetry": symmetry
+            and {
+                "map": {s: text(e) for s, e in zip(t.state_names, symmetry.map, strict=True)},
+                "shift": symmetry.shift,
+                "modes": {d.traced.mode_names[i]: d.traced.mode_names[j] for i, j in enumerate(symmetry.modes)},
+            },
+            "impacts": "sequential" if patterns is not None and patterns.make.sequential else None,
+            "elements": loads and {load.name: _element_content(load, t.state_names, text) for load in loads.elements},
+            "powers": loads and {name: text(power) for name, power in loads.powers.items()},
+            "energy": loads and loads.energy,
+            "ranges": [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges] or None,
+            "bands": {d.traced.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands} or None,
         }
-    if elements is not None and elements.make.sequential:
-        content["impacts"] = "sequential"
-    if known:
-        from nonsmooth.system.derived.expressions import SPEED
-
-        names = {**names, SPEED: "speed"}
-        content["elements"] = {k: _element_content(one, text) for k, one in known.items()}
-    if d.loads is not None:
-        content["loads"] = _loads_content(d.loads, d, text)
-    for name, asked in () if known else (("ranges", d.ranges), ("limits", d.limits)):
-        if asked:
-            content[name] = [{"not negative": text(e), "else": sentence} for e, sentence in asked]
-    if d.bands:
-        content["bands"] = {d.traced.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
-    return content
+    )
 
 
-def _element_content(element: Mapping[str, Any], text: Callable[[sp.Expr], str]) -> dict[str, Any]:
+def _known(entry: dict[str, Any]) -> dict[str, Any]:
+    """The entries that are there."""
+    return {key: one for key, one in entry.items() if one is not None}
+
+
+def _element_content(element: Load, states: Sequence[str], text: Callable[[sp.Expr], str]) -> dict[str, Any]:
     """Return an element with its expressions as text."""
     return {
-        key: text(e)
-        if isinstance(e, sp.Expr)
-        else {k: text(v) if isinstance(v, sp.Expr) else v for k, v in e.items()}
-        if isinstance(e, Mapping)
-        else e
-        for key, e in element.items()
+        "kind": element.kind,
+        "given": element.text,
+        "options": {key: one.item() if isinstance(one, np.generic) else one for key, one in element.options.items()},
+        "where": text(element.where),
+        "on": {states[i]: text(e) for i, e in element.direction.items() if e != 0},
+        "laws": {name: text(law) for name, law in element.laws.items()},
     }
-
-
-def _loads_content(loads: Loads, d: Description, text: Callable[[sp.Expr], str]) -> dict[str, Any]:
-    """Return the loads of elements; what is not there is left out."""
-    states = d.traced.state_names
-
-    def element(load: Load) -> dict[str, Any]:
-        known = {"where": load.where, "rate": load.rate}
-        return {
-            "kind": load.kind,
-            "given": load.text,
-            **{key: text(e) for key, e in known.items() if e is not None},
-            "on": {states[i]: text(e) for i, e in load.direction.items()},
-        }
-
-    return {
-        "elements": {load.name: element(load) for load in loads.elements},
-        "modes": {mode: dict(zip(states, map(text, field), strict=True)) for mode, field in loads.fields.items()},
-        "powers": {key: text(power) for key, power in loads.powers.items()},
-        "energy": loads.energy,
-    }
-
-
-def _surface_content(surface: TracedSurface, t: Traced, names: Mapping[sp.Symbol, str]) -> dict[str, Any]:
-    """Return a surface; what was not given is left out."""
-    entry: dict[str, Any] = {
-        "surface": t.indicator_names[surface.indicator],
-        "below": t.mode_names[surface.below],
-        "above": t.mode_names[surface.above],
-        "mode": surface.mode,
-    }
-    if surface.static is not None:
-        entry["static"] = write_expression(surface.static, names)
-    if surface.field is not None:
-        own = zip(t.state_names, surface.field, t.lacking[surface.below], strict=True)
-        entry["field"] = {state: write_expression(e, names) for state, e, gone in own if not gone}
-    return entry
 
 
 def _band_content(band: Any, d: Description) -> dict[str, Any]:
-    names = d.symbol_names | {band.eta: "p.eta"} | {symbol: f"p.{name}" for name, _, symbol, _ in band.memory}
+    names = (
+        d.traced.named("u.", "p.") | {band.eta: "p.eta"} | {symbol: f"p.{name}" for name, _, symbol, _ in band.memory}
+    )
     t = d.traced
     return {
         "field": {s: write_expression(e, names) for s, e in zip(t.state_names, band.field, strict=True)},
@@ -229,7 +199,7 @@ def read_system(text: str) -> System:
         )
     try:
         reader = _Reader(content)
-        system = reader.with_loads(reader.within_ranges(System(**reader.arguments())))
+        system = reader.refined(System(**reader.arguments()))
         smoothing = content.get("smoothing")
         return system if smoothing is None else system.smoothed(smoothing["eta"], smoothing.get("band", "linear"))
     except SystemDefinitionError as error:  # names and units in it may be of any length
@@ -314,17 +284,14 @@ class _Reader:
             "impacts": c.get("impacts", "simultaneous"),
         }
 
-    def kind(self, name: str) -> Any:
-        from nonsmooth.system.derived import elements
-
-        if name not in elements.__all__ or name == "Element":
-            raise SystemDefinitionError(f"there is no element {shortened(name)}")
-        return getattr(elements, name)
-
     def element(self, entry: Mapping[str, Any]) -> Any:
+        from nonsmooth.system.derived import elements
         from nonsmooth.system.derived.expressions import SPEED
 
-        kind = self.kind(entry["kind"])
+        name = entry["kind"]
+        if name not in elements.__all__ or name == "Element":
+            raise SystemDefinitionError(f"there is no element {shortened(name)}")
+        kind = getattr(elements, name)
 
         def law(text: str) -> Callable[..., Any]:
             expression = self.expression(text, {"speed": SPEED})
@@ -332,53 +299,21 @@ class _Reader:
                 return lambda t, u, p: Scalar(expression)
             return lambda v, p: Scalar(expression.subs(SPEED, v.expression))
 
-        return kind(
+        made = kind(
             **entry["options"],
             **{key: law(text) for key, text in entry["laws"].items()},
-            **{kind.kinematics: law(entry[kind.kinematics])},
+            **{kind.kinematics: law(entry["where"])},
             on={key: law(text) for key, text in entry["on"].items()},
         )
+        object.__setattr__(made, "given", str(entry["given"]))
+        return made
 
-    def within_ranges(self, system: System) -> System:
-        """The system with what its parameters must fulfil beyond what its equations say."""
-        ranges, limits = (
-            tuple((self.expression(e["not negative"]), e["else"]) for e in self.content.get(name, []))
-            for name in ("ranges", "limits")
-        )
-        if not (ranges or limits):
-            return system
-        description = replace(system._description, ranges=ranges, limits=limits, variants={})
-        return type(system)._make(description, dict(system.values), variant_of(description))
-
-    def with_loads(self, system: System) -> System:
-        """The system with the loads of its elements."""
-        if "loads" not in self.content:
-            return system
-        from nonsmooth.system.derived.loads import Load, Loads
-
-        c, states = self.content["loads"], list(system.states)
-        for name in c["elements"]:
-            if f"{name}_force" not in system.outputs:
-                raise SystemDefinitionError(f"loads of an element {shortened(name)}, which is not there")
-
-        def read(text: Any) -> sp.Expr | None:
-            return None if text is None else self.expression(text)
-
-        elements = tuple(
-            Load(
-                str(name),
-                self.kind(e["kind"]).__name__,
-                str(e["given"]),
-                read(e["where"]),
-                read(e.get("rate")),
-                {states.index(state): read(one) for state, one in e["on"].items()},
-            )
-            for name, e in c["elements"].items()
-        )
-        fields = {mode: tuple(read(e[state]) for state in states) for mode, e in c["modes"].items()}
-        powers = {name: read(power) for name, power in c["powers"].items()}
-        description = system._description.with_loads(Loads(elements, fields, powers, str(c["energy"])))
-        return type(system)._make(description, dict(system.values), system._variant)
+    def refined(self, system: System) -> System:
+        """The system with the powers of a mechanical one, and with what its parameters must fulfil beyond what its
+        equations say."""
+        ranges = [(self.expression(e["not negative"]), e["else"]) for e in self.content.get("ranges", [])]
+        powers = {name: self.expression(power) for name, power in self.content.get("powers", {}).items()}
+        return system._of(system._description.refined(powers, str(self.content.get("energy", "")), ranges))
 
     def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
         if "surface" in entry:

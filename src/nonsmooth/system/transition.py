@@ -190,22 +190,8 @@ _SIGN = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>])(=?)\s*0(?:\.0*)?\s*\Z")
 
 
 def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple[tuple[str, int, bool], ...]:
-    """Return (indicator, sign, strict) for each sign of a condition; ``>= 0`` is not strict.
-
-    Parameters
-    ----------
-    text : str
-        For example ``"penetration > 0 and separation < 0"``.
-    indicators : sequence of str
-        Names that may occur.
-    label : str
-        The transition, for the message.
-
-    Raises
-    ------
-    SystemDefinitionError
-        Outside the grammar, an unknown indicator, or the same indicator asked to have both signs.
-    """
+    """Return (indicator, sign, strict) for each sign of a condition such as ``"penetration > 0 and separation < 0"``;
+    ``>= 0`` is not strict. ``label`` names the transition in messages."""
     if not isinstance(text, str):
         raise SystemDefinitionError(f"{label}: `when` must be a string of the form: {GRAMMAR}; not {shortened(text)}")
     signs: dict[str, tuple[int, bool]] = {}
@@ -233,32 +219,30 @@ def condition_text(rows: Sequence[tuple[str, int, bool]]) -> str:
 
 def phases(traced: Traced) -> NDArray[np.float64]:
     """One for each transition: -1 where it has a condition, 0 where the phase depends on the parameters."""
-    given = [-1.0 if at is None else at for at in _expressions(traced)]
+    given = [-1.0 if jump.at is None else jump.at for jump in traced.transitions]
     return np.array([0.0 if hasattr(at, "free_symbols") else at for at in given], dtype=float)
 
 
 @lru_cache(maxsize=32)
 def varying_phases(traced: Traced) -> Callable[[Any], NDArray[np.float64]] | None:
     """The same as a function of the parameters' values; None where no phase depends on them."""
-    found = _expressions(traced)
-    if not any(hasattr(at, "free_symbols") for at in found):
-        return None
-    import sympy as sp
-
-    function = sp.lambdify(traced.p, [-1.0 if at is None else at for at in found], modules="math")
-    return lambda values: np.array(function(*np.asarray(values, dtype=float).tolist()), dtype=float)
+    found = [-1.0 if jump.at is None else jump.at for jump in traced.transitions]
+    return _of_parameters(traced, found) if any(hasattr(at, "free_symbols") for at in found) else None
 
 
 @lru_cache(maxsize=32)
 def phase_slopes(traced: Traced, places: tuple[int, ...]) -> Callable[[Any], NDArray[np.float64]]:
     """Derivatives (transitions, parameters) of the phases in the parameters at ``places``."""
+    symbols, phases_ = [traced.p[i] for i in places], [jump.at for jump in traced.transitions]
+    slopes = _of_parameters(
+        traced, [0 if isinstance(at, float | int | None) else at.diff(s) for at in phases_ for s in symbols]
+    )
+    return lambda values: slopes(values).reshape(len(phases_), len(places))
+
+
+def _of_parameters(traced: Traced, expressions: list[Any]) -> Callable[[Any], NDArray[np.float64]]:
+    """Expressions as a function of the parameters' values."""
     import sympy as sp
 
-    rows = [[sp.diff(at, traced.p[i]) if hasattr(at, "diff") else 0 for i in places] for at in _expressions(traced)]
-    shape = len(rows), len(places)
-    function = sp.lambdify(traced.p, [entry for row in rows for entry in row], modules="math")
-    return lambda values: np.array(function(*np.asarray(values, dtype=float).tolist()), dtype=float).reshape(shape)
-
-
-def _expressions(traced: Traced) -> list[Any]:
-    return [jump.at for jump in traced.transitions]
+    function = sp.lambdify(traced.p, expressions, modules="math")
+    return lambda values: np.array(function(*np.asarray(values, dtype=float).tolist()), dtype=float)

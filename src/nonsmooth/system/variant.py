@@ -8,10 +8,10 @@ All are expanded, so that "is it constant?" is a question about free symbols.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, cached_property
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -19,14 +19,17 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.description import Description
 from nonsmooth.system.kinds import real_number
+from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.domain import Domain
-from nonsmooth.system.symbolic.traced import Traced
-
-if TYPE_CHECKING:
-    from nonsmooth.system.symbolic.traced import Traced
-
+from nonsmooth.system.symbolic.traced import Traced, along
 
 SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
+
+
+class Tried(dict[str, float]):
+    """Values of parameters that a fit tries: to a small friction it may come from beyond zero."""
+
+    covariance = None
 
 
 class Variant:
@@ -38,22 +41,28 @@ class Variant:
         self.memory: dict[str, tuple[float, str]] = dict(description.memory)
         extra: tuple[Any, ...] = ()
         if kind == SHARP:
-            self.traced: Traced = description.with_sliding(description.traced)
-            extra = tuple(_static_ratios(description))
+            declared, surfaces = description.traced, description.surfaces
+            self.traced: Traced = declared
+            if surfaces:
+                from nonsmooth.system.derived.sliding import slide
+
+                self.traced = slide(declared, surfaces, description.scale)
+            for surface in surfaces:
+                if surface.static is not None and surface.static.free_symbols <= set(declared.p):
+                    modes = " | ".join(declared.mode_names[mode] for mode in (surface.below, surface.above))
+                    says = (
+                        f"`static` of surface {declared.indicator_names[surface.indicator]} ({modes}) must be 1 or more"
+                    )
+                    extra += ((surface.static - 1, says),)
         else:
             from nonsmooth.system.derived.smoothing import smooth
 
             smoothed = smooth(description, kind == ONE_ETA, band or "linear")
             self.traced, self.etas, extra = smoothed.traced, smoothed.etas, smoothed.apart
             self.memory |= {name: (0.0, unit) for name, unit in smoothed.memory}
-        self.units: Mapping[str, str] = {
-            **{name: parameter.unit for name, parameter in description.parameters.items()},
-            **{name: "" for name, _ in self.etas},
-        }
-        self.symbols: Mapping[str, str] = {
-            **{name: parameter.symbol for name, parameter in description.parameters.items()},
-            **{name: r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}" for name, of in self.etas},
-        }
+        self.name, self.parameters = description.name, dict(description.parameters)
+        for name, of in self.etas:
+            self.parameters[name] = Parameter(0.0, "", r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}")
         self.domain = Domain(self.traced, (*description.ranges, *extra), description.limits)
         tables = {
             "states": description.states,
@@ -64,7 +73,7 @@ class Variant:
         }
         #: What a system is, whatever the values of its parameters.
         self.facts: dict[str, Any] = {name: MappingProxyType(dict(one)) for name, one in tables.items()} | {
-            "name": description.name,
+            "name": self.name,
             "surfaces": description.surfaces if kind == SHARP else (),
             "symmetry": description.symmetry,
             "explicit_time": description.explicit_time,
@@ -84,8 +93,6 @@ class Variant:
         """The forcing period as a function of all parameters in order."""
         if self.traced.period is None:
             return None
-        import sympy as sp
-
         return sp.lambdify(self.traced.p, self.traced.period, modules="math")
 
     def period_at(
@@ -106,30 +113,69 @@ class Variant:
             return values["eta"]
         return {str(indicator): values[key] for key, indicator in self.etas}
 
-    def refuse_patterns(self, name: str, verb: str) -> None:
+    def refuse_patterns(self, verb: str) -> None:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
         if self.traced.patterns is not None:
             raise SystemDefinitionError(
-                f"{name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it. Not so "
-                f"for {verb}: take fewer elements for it"
+                f"{self.name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it. "
+                f"Not so for {verb}: take fewer elements for it"
             )
+
+    def changed(self, values: Mapping[str, float], given: Any, named: Mapping[str, float]) -> dict[str, float]:
+        """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it.
+
+        What a fit tries or has found (it has a ``covariance``) is not held to what is asked of given values."""
+        changes = dict(named)
+        if given is not None:
+            mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
+            if not isinstance(mapping, Mapping):
+                raise TypeError(
+                    f"with_parameters takes a mapping or an object with a mapping `values`, not {shortened(given)}"
+                )
+            changes = {**mapping, **changes}
+        new = dict(values)
+        for key, value in changes.items():
+            self._check_known(key)
+            if type(value) is not float or value - value != 0:
+                value = real_number(value, f"parameter {key!r}")
+            new[key] = value
+        for key, _ in self.etas:
+            if key in changes:
+                _positive(new[key], key)
+        self.domain.check(new, changes, tried=hasattr(given, "covariance"))
+        return new
+
+    def rows(self, values: Mapping[str, float], columns: Mapping[str, Any]) -> np.ndarray:
+        """Rows of values (P, n_parameters) in declared order, for columns of equal length P."""
+        lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
+        sizes = {column.shape for column in lists.values()}
+        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
+            raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
+        now = np.array(list(values.values()), dtype=np.float64)
+        points = np.tile(now, (next(iter(sizes))[0] if sizes else 1, 1))
+        order = list(values)
+        for key, column in lists.items():
+            self._check_known(key)
+            if not np.isfinite(column).all():
+                raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
+            if key in dict(self.etas):
+                _positive(float(column.min()), key)
+            points[:, order.index(key)] = column
+        if len(points):
+            self.domain.check_points(points)
+        return points
+
+    def _check_known(self, key: str) -> None:
+        """ValueError for what is no parameter."""
+        if key not in self.parameters:
+            units = {name: parameter.unit for name, parameter in self.parameters.items()}
+            hint = "; eta is set by smoothed(eta)" if str(key).startswith("eta") and self.kind == SHARP else ""
+            raise ValueError(unknown(key, "a parameter", repr(self.name), units) + hint)
 
     @cached_property
     def derivatives(self) -> Derivatives:
         """Exact derivatives, built on demand."""
         return Derivatives(self.traced)
-
-
-def _static_ratios(description: Description) -> Iterator[tuple[Any, str]]:
-    """Excess of the static value over the kinetic one, not negative, where it depends on parameters alone."""
-    declared = description.traced
-    for surface in description.surfaces:
-        if surface.static is not None and surface.static.free_symbols <= set(declared.p):
-            names = (
-                declared.indicator_names[surface.indicator],
-                *(declared.mode_names[mode] for mode in (surface.below, surface.above)),
-            )
-            yield surface.static - 1, "`static` of surface {} ({} | {}) must be 1 or more".format(*names)
 
 
 def variant_of(description: Description, kind: str = SHARP, band: str | None = None) -> Variant:
@@ -145,29 +191,11 @@ Matrix = tuple[Vector, ...]
 
 
 class Derivatives:
-    """Derivatives of a traced system.
-
-    Parameters
-    ----------
-    traced : Traced
-
-    Notes
-    -----
-    ``of`` is one of ``"u"``, ``"t"``, ``"p"``, ``"m"`` (memory): the columns of a Jacobian. All methods
-    take indices and return tuples of SymPy expressions.
-    """
+    """Derivatives of a traced system, by indices, as tuples of SymPy expressions; ``of`` is one of ``"u"``, ``"t"``,
+    ``"p"``, ``"m"`` (memory): the columns of a Jacobian."""
 
     def __init__(self, traced: Traced) -> None:
         self.traced = traced
-        # One cache for each object, gone with it (a cache on the methods would keep the object alive).
-        self.field = cache(self._field)
-        self.indicator = cache(self._indicator)
-        self.indicator_hessian = cache(self._indicator_hessian)
-        self.output = cache(self._output)
-        self.reset = cache(self._reset)
-        self.write = cache(self._write)
-        self.lie = cache(self._lie)
-        self.divergence = cache(self._divergence)
 
     def variables(self, of: str) -> tuple[sp.Symbol, ...]:
         """The symbols meant by ``of``."""
@@ -181,100 +209,43 @@ class Derivatives:
         free = expression.free_symbols
         return tuple(sp.expand(expression.diff(s)) if s in free else sp.Integer(0) for s in self.variables(of))
 
-    def _field(self, mode: int, of: str = "u") -> Matrix:
+    def field(self, mode: int, of: str = "u") -> Matrix:
         """Jacobian of a vector field, (n, n_of)."""
         return tuple(self._gradient(entry, of) for entry in self.traced.fields[mode])
 
-    def _divergence(self, mode: int) -> sp.Expr:
+    def divergence(self, mode: int) -> sp.Expr:
         """Divergence of a vector field: the rate at which it changes volumes."""
         return sp.expand(sum(self.field(mode, "u")[i][i] for i in range(len(self.traced.u))))
 
-    def _indicator(self, indicator: int, of: str = "u") -> Vector:
+    def indicator(self, indicator: int, of: str = "u") -> Vector:
         """Gradient of an indicator, (n_of,)."""
         return self._gradient(self.traced.indicators[indicator], of)
 
-    def _indicator_hessian(self, indicator: int) -> Matrix:
+    def indicator_hessian(self, indicator: int) -> Matrix:
         """Second derivatives of an indicator in u, (n, n)."""
         return tuple(self._gradient(entry, "u") for entry in self.indicator(indicator, "u"))
 
-    def _output(self, output: int, mode: int, of: str = "u") -> Vector:
+    def output(self, output: int, mode: int, of: str = "u") -> Vector:
         """Gradient of an output in a mode, (n_of,)."""
         return self._gradient(self.traced.outputs[output][mode], of)
 
-    def _reset(self, transition: int, of: str = "u") -> Matrix:
+    def reset(self, transition: int, of: str = "u") -> Matrix:
         """Jacobian of the map applied at a transition, (n, n_of); the identity's where there is none."""
         reset = self.traced.transitions[transition].reset
         return tuple(self._gradient(entry, of) for entry in (self.traced.u if reset is None else reset))
 
-    def _write(self, transition: int, of: str = "u") -> dict[int, Vector]:
+    def write(self, transition: int, of: str = "u") -> dict[int, Vector]:
         """Gradients of what a transition writes, by index of memory."""
         return {i: self._gradient(value, of) for i, value in self.traced.transitions[transition].writes}
 
-    def _lie(self, indicator: int, mode: int, order: int = 1) -> sp.Expr:
+    def lie(self, indicator: int, mode: int, order: int = 1) -> sp.Expr:
         """Lie derivative of an indicator along the field of a mode, order 0 to 3 and more."""
         if order < 0:
             raise ValueError(f"the order of a Lie derivative is not negative, {order}")
         if order == 0:
             return self.traced.indicators[indicator]
-        before, t = self.lie(indicator, mode, order - 1), self.traced
-        flow = sum(before.diff(u) * f for u, f in zip(t.u, t.fields[mode], strict=True))
-        return sp.expand(before.diff(t.t) + flow)
-
-
-class Tried(dict[str, float]):
-    """Values of parameters that a fit tries: to a small friction it may come from beyond zero."""
-
-    covariance = None
-
-
-def changed_values(
-    variant: Variant, values: Mapping[str, float], name: str, given: Any, named: Mapping[str, float]
-) -> dict[str, float]:
-    """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it.
-
-    What a fit tries or has found (it has a ``covariance``) is not held to what is asked of values that are given."""
-    changes = dict(named)
-    if given is not None:
-        mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
-        if not isinstance(mapping, Mapping):
-            raise TypeError(
-                f"with_parameters takes a mapping or an object with a mapping `values`, not {shortened(given)}"
-            )
-        changes = {**mapping, **changes}
-    new = dict(values)
-    for key, value in changes.items():
-        if key not in new:
-            raise ValueError(_unknown_parameter(key, variant, name))
-        if type(value) is not float or value - value != 0:
-            value = real_number(value, f"parameter {key!r}")
-        new[key] = value
-    for key, _ in variant.etas:
-        if key in changes:
-            _positive(new[key], key)
-    variant.domain.check(new, changes, tried=hasattr(given, "covariance"))
-    return new
-
-
-def parameter_rows(variant: Variant, values: Mapping[str, float], name: str, columns: Mapping[str, Any]) -> np.ndarray:
-    """Rows of values (P, n_parameters) in declared order, for columns of equal length P."""
-    lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
-    sizes = {column.shape for column in lists.values()}
-    if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
-        raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
-    now = np.array(list(values.values()), dtype=np.float64)
-    points = np.tile(now, (next(iter(sizes))[0] if sizes else 1, 1))
-    order = list(values)
-    for key, column in lists.items():
-        if key not in values:
-            raise ValueError(_unknown_parameter(key, variant, name))
-        if not np.isfinite(column).all():
-            raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
-        if key in dict(variant.etas):
-            _positive(float(column.min()), key)
-        points[:, order.index(key)] = column
-    if len(points):
-        variant.domain.check_points(points)
-    return points
+        t = self.traced
+        return sp.expand(along(self.lie(indicator, mode, order - 1), t.t, t.u, t.fields[mode]))
 
 
 def smoothed_values(
@@ -303,13 +274,6 @@ def smoothed_values(
     new = plain | {key: _positive(real_number(width, key), key) for key, width in widths.items()}
     variant.domain.check(new)
     return new, variant
-
-
-def _unknown_parameter(key: object, variant: Variant, name: str) -> str:
-    text = unknown(key, "a parameter", repr(name), variant.units)
-    if str(key).startswith("eta") and variant.kind == SHARP:
-        text += "; eta is set by smoothed(eta)"
-    return text
 
 
 def _positive(width: float, key: str) -> float:

@@ -16,7 +16,7 @@ from nonsmooth.plot import COLORS
 from nonsmooth_savi2007 import Reproduction
 from nonsmooth_savi2007.figures.diagrams import other_motions
 from nonsmooth_savi2007.figures.figure import Figure
-from nonsmooth_savi2007.figures.gap import transient_points
+from nonsmooth_savi2007.figures.measured_diagrams import transient_points
 from nonsmooth_savi2007.printed import FIGURE_14, NUMBERS
 from nonsmooth_savi2007.study import figures_of_the_study
 

@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth_savi2007 import reproduce
-from nonsmooth_savi2007.claims.diagrams import f13_basins, f17_basins
+from nonsmooth_savi2007.claims.diagrams import attractors
 from nonsmooth_savi2007.figures.charts import CHARTS, curves, grid_of
 from nonsmooth_savi2007.figures.coexisting import names_of
 from nonsmooth_savi2007.flows import Settings
@@ -35,10 +35,10 @@ def test_charts_belong_to_a_full_run_only() -> None:
 
 def test_the_coexisting_attractors_stand_in_the_report(basins: dict[str, dict]) -> None:
     """Periods 3 and 4 at g = 0.0014 m, chaos and period 3 at 9.55 rad/s; errors sqrt(f (1 - f) / n)."""
-    for name, measure, periods in (("basins13", f13_basins, [3, 4]), ("basins17", f17_basins, [0, 3])):
+    for name, periods in (("basins13", [3, 4]), ("basins17", [0, 3])):
         found = basins[name]["basins"]
         assert sorted(found["period_number"].values.tolist()) == periods
-        (row,) = measure(basins)
+        (row,) = attractors(basins, name)
         assert row.verdict == "agrees in part" and "1600 starts" in row.exact and "none reached by 0" in row.exact
         for k, words in enumerate(names_of(found)):
             share = float((found["label"] == k).mean())

@@ -110,7 +110,7 @@ def test_a_cell_beside_a_printed_number() -> None:
     assert (cell.text, cell.verdict) == ("8.450 ± 0.029 N/m; -0.2 % (0.0 to 0.8)", "agrees")  # 0.1 / sqrt(12) = 0.029
     assert printed_cell(NUMBERS["jump falling"], None).text == "not found"
     answer = Cell("c", Verdict.DIFFERS, "Rig.")
-    row = Statement("F9b", "here", "5.29", "a", "b", "none", Verdict.AGREES, "Model.").measured(answer)
+    row = Statement("here", "5.29", "a", "b", "none", Verdict.AGREES, "Model.").measured(answer)
     assert (row.rig, row.rig_verdict, row.verdict, row.why) == ("c", "differs", "agrees", "Model. Rig.")
 
 

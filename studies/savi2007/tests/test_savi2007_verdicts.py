@@ -51,7 +51,7 @@ def _known(value: float, expanded: float) -> Interval:
     ],
 )
 def test_the_rule(printed: str, value: float, expanded: float, verdict: str) -> None:
-    row = against_printed("F1", "a number", Printed(printed, "N", "here"), [_known(value, expanded), None])
+    row = against_printed("a number", Printed(printed, "N", "here"), [_known(value, expanded), None])
     assert row.verdict == verdict
 
 
@@ -102,7 +102,6 @@ def test_plus_minus_is_the_standard_uncertainty() -> None:
 def _row(claim: str, verdict: Verdict, rig: Verdict, cause: Cause | None = None) -> Statement:
     beside = Beside(1.0, 0.005, 1.01, 0.001) if verdict is Verdict.AGREES else None
     row = Statement(
-        claim,
         "here",
         f"{claim} says",
         "exact",
@@ -110,6 +109,7 @@ def _row(claim: str, verdict: Verdict, rig: Verdict, cause: Cause | None = None)
         "off",
         verdict,
         "Reason.",
+        id=claim,
         cause=cause,
         exact_beside=beside,
         smoothed_beside=beside,

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
+from nonsmooth.identification.compare.draws import intervals
 from nonsmooth.identification.compare.orbits import cloud_distance
 from nonsmooth.identification.compare.response import AmplitudeJump, match_jumps
 
@@ -84,3 +85,16 @@ def test_an_interval_takes_half_of_the_draws(having: int, known: bool) -> None:
     ends = [float(found[f"theory_jump_{word}"][1][0]) for word in ("low", "high")]
     expected = [5.0 + 0.1 * (having - 1) * share for share in (0.25, 0.75)] if known else [np.nan, np.nan]
     assert ends == pytest.approx(expected, nan_ok=True)
+
+
+def test_where_nothing_flips_the_intervals_are_empty_however_many_draws_there_are() -> None:
+    """Neither record nor theory has a flip: a table of draws without a column, whose quantiles NumPy gives no rows."""
+    assert intervals("theory_flip", "flip", [], "m", 0.95) == {}
+    empty = intervals("theory_flip", "flip", [[], [], []], "m", 0.95)
+    assert {name: column[1].shape for name, column in empty.items()} == {
+        "theory_flip_low": (0,),
+        "theory_flip_high": (0,),
+    }
+    drawn = [[0.1, np.nan], [0.3, np.nan], [np.nan, 0.2]]
+    low, high = (column[1] for column in intervals("theory_flip", "flip", drawn, "m", 0.5).values())
+    np.testing.assert_allclose([low, high], [[0.15, np.nan], [0.25, np.nan]])  # one draw of three is no interval

@@ -8,7 +8,7 @@ from typing import Any, Literal, Unpack
 import numpy as np
 import xarray as xr
 
-from nonsmooth.errors import unknown
+from nonsmooth.errors import check_keys
 from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
@@ -128,8 +128,14 @@ def compare(
     at the distance of the measured cloud's own halves. The energy distance is the root,
     :math:`\sqrt{2 E|X-Y| - E|X-X'| - E|Y-Y'|}`, as SciPy defines it; NaN with fewer than 40 points in a cloud.
     """
-    set_ = _settings(theory, parameters, settings)
-    options["draws"] = _draws(options["draws"], theory, parameters, set_)
+    set_ = read_settings(settings, theory) if isinstance(theory, System) else {}
+    if not isinstance(theory, System) and (parameters is not None or settings):
+        raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
+    if options["draws"] is None:  # none of a theory in which no uncertainty shows
+        uncertain = hasattr(parameters, "covariance") or any(
+            pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in set_.values()
+        )
+        options["draws"] = DRAWS if uncertain and hasattr(theory, "parameters") else 0
     if not 0 < options["level"] < 1:
         raise ValueError(f"level = {options['level']!r} must lie between 0 and 1, as 0.95")
     if not isinstance(measured, xr.Dataset) or channels is not None:
@@ -175,25 +181,6 @@ def compare(
         variables = compare_motion(measured, model, start, phases)
     result = _dataset(variables, measured, model, kind, given)
     return result.squeeze("section_phase") if kind == "motion" and np.ndim(section_phase) == 0 else result
-
-
-def _settings(theory: Any, parameters: Any, given: Any) -> dict[str, Any]:
-    """The settings of a System; a result at hand takes none."""
-    if isinstance(theory, System):
-        return read_settings(given, theory)
-    if parameters is not None or given:
-        raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
-    return {}
-
-
-def _draws(given: int | None, theory: Any, parameters: Any, settings: Mapping[str, Any]) -> int:
-    """The number of draws; where none is given, none of a theory in which no uncertainty shows."""
-    if given is not None:
-        return given
-    uncertain = hasattr(parameters, "covariance") or any(
-        pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in settings.values()
-    )
-    return DRAWS if uncertain and hasattr(theory, "parameters") else 0
 
 
 def _kind(measured: xr.Dataset, parameter: str | None) -> str:
@@ -242,9 +229,7 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
             f"noise={{{', '.join(map(repr, states))}: ...}}, or `u_error` or `section_error` in the measured Dataset"
         )
     if isinstance(noise, Mapping):
-        for name in noise:
-            if name not in states:
-                raise ValueError(unknown(name, "a state", "this measurement", states))
+        check_keys(noise, states, "noise", "a state", "this measurement")
         if missing := [name for name in states if name not in noise]:
             raise ValueError(f"noise is not given for {', '.join(missing)}")
         noise = [noise[name] for name in states]
@@ -287,13 +272,10 @@ def _dataset(
         labels = labels_of(model.system)
         method = str(given.get("method", "auto"))
         record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=model.seed)))
-        for name, quantity in labels.parameters.items():
-            if name not in variables:
-                attributes = {"long_name": name, "units": quantity.unit}
-                variables[name] = ((), float(quantity.value or 0.0), attributes)
+        own = {name: labelled((), float(q.value or 0.0), name, q.unit) for name, q in labels.parameters.items()}
+        variables = own | variables
     units = _state_units(model)
     record["measured"] = {key: str(value) for key, value in measured.attrs.items() if key != ATTRIBUTE}
-    synthetic = str(measured.attrs.get("synthetic", "no"))
     coords = {
         "state": labelled("state", np.array(model.states), "state"),
         "state_unit": labelled("state", np.array([units[name] for name in model.states]), "unit"),
@@ -302,5 +284,6 @@ def _dataset(
     named = {key for key, (dims, _, _) in variables.items() if dims == key or (not dims and key in parameter_names)}
     coords |= {key: variables.pop(key) for key in sorted(named)}
     data = {key: (dims, np.asarray(values), attrs) for key, (dims, values, attrs) in variables.items()}
+    synthetic = str(measured.attrs.get("synthetic", "no"))
     attrs = {"comparison": kind, "synthetic": synthetic, "title": str(measured.attrs.get("title", ""))}
     return with_short_record(xr.Dataset(data, coords, attrs | attribute(record)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
-from nonsmooth.identification.compare.draws import Model
+from nonsmooth.identification.compare.draws import Model, intervals
 from nonsmooth.identification.compare.periods import MeasuredFlip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 from nonsmooth.results.labels import labelled
@@ -105,15 +104,13 @@ def _measured(measured: xr.Dataset, name: str, model: Model) -> tuple[FloatArray
         numbers = [measured_period(one, model.noise, max_period=model.max_period).number for one in stacked]
         at = np.repeat(measured[name].values.astype(float), stacked.shape[1])
         points, found = stacked.reshape(-1, stacked.shape[2]), np.repeat(numbers, stacked.shape[1])
-    else:
-        points = section.transpose("iterate", "state").values
-        at = np.asarray(measured[name].values, float)
-        if at.shape != points.shape[:1]:
-            raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
         good = np.isfinite(points).all(axis=1)
-        return at[good], points[good], period_numbers(points[good], model.noise, max_period=min(model.max_period, 8))
+        return at[good], points[good], np.asarray(found, np.int64)[good]
+    points, at = section.transpose("iterate", "state").values, np.asarray(measured[name].values, float)
+    if at.shape != points.shape[:1]:
+        raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
     good = np.isfinite(points).all(axis=1)
-    return at[good], points[good], np.asarray(found, np.int64)[good]
+    return at[good], points[good], period_numbers(points[good], model.noise, max_period=min(model.max_period, 8))
 
 
 def _flips(
@@ -134,14 +131,5 @@ def _flips(
         "theory_flip": labelled(over, t, "predicted flip (NaN: none is predicted)", unit),
         "flip_relative_difference": labelled(over, t / m - 1, "predicted over measured flip, minus 1"),
     }
-    if drawn:
-        table = np.array([[one.get(word, np.nan) for word in words] for one in drawn], float)
-        table[:, np.isfinite(table).sum(axis=0) * 2 < len(drawn)] = np.nan  # too few draws have it
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)
-            band = model.band(table)
-        for word in ("low", "high"):
-            variables[f"theory_flip_{word}"] = labelled(
-                over, band[word], f"{word} end of the interval for drawn parameters", unit
-            )
-    return variables
+    table = [[one.get(word, np.nan) for word in words] for one in drawn]
+    return variables | intervals("theory_flip", over, table, unit, model.level)

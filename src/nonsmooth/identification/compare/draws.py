@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -46,11 +47,6 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
 
     Each is a number, a pair, or ``{"value": ..., "uncertainty": ...}``; the value may be a function of the other
     parameters (the force of a crank is ``lambda p: p["k"] * a``, and uncertain as k is).
-
-    Raises
-    ------
-    ValueError
-        A name that is no parameter of the system, or a negative uncertainty.
     """
     read: dict[str, Setting] = {}
     for name, given in (settings or {}).items():
@@ -95,27 +91,10 @@ def draw_systems(
 ) -> tuple[list[System], dict[str, np.ndarray]]:
     """Systems whose parameters are drawn from their joint law, and the draws by name.
 
-    Parameters
-    ----------
-    system : System
-    parameters : ParameterSet or mapping, optional
-        With ``draw(n, seed)`` that is used; with ``covariance`` (a DataArray over the parameters, twice), a normal law.
-        A mapping without either is taken as exact.
-    settings : mapping
-        As from :func:`read_settings`: independent, normal; a setting that is also a parameter replaces it.
-    draws, seed : int
-    bounds : mapping, optional
-        ``{name: (low, high)}``, None for no end: a draw outside is drawn again.
-
-    Raises
-    ------
-    ValueError
-        Bounds that are not such; a covariance from which almost no draw is allowed by the system's equations.
-
-    Notes
-    -----
-    A draw that the equations refuse (a mass below zero), or in which a positive parameter has become negative, is
-    drawn again: a damping known only to a factor has a law that ends at zero.
+    ``parameters`` with ``draw(n, seed)`` draw by it, with ``covariance`` by a normal law; a mapping without either is
+    exact. ``settings`` are independent and normal, and replace parameters. A draw outside of ``bounds``, one that the
+    equations refuse (a mass below zero), or in which a positive parameter has become negative, is drawn again: a
+    damping known only to a factor has a law that ends at zero.
     """
     rng = np.random.default_rng(seed)
     base = nominal(system, parameters, settings)
@@ -163,6 +142,24 @@ def check_parameter(name: str, system: System) -> None:
     if name not in system.parameters:
         units = {key: item.unit for key, item in system.parameters.items()}
         raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+
+
+def quantiles(draws: Any, edges: Any) -> np.ndarray:
+    """Quantiles over draws; NaN, which tells nothing, is passed over."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # no draw has a value here
+        return np.nanquantile(np.asarray(draws, float), edges, axis=0)
+
+
+def intervals(name: str, over: str, drawn: Any, unit: str, level: float) -> dict[str, Any]:
+    """Ends of the intervals of drawn values (draws, n), NaN where fewer than half of the draws have one."""
+    if not len(drawn):
+        return {}
+    table = np.array(drawn, float)
+    table[:, np.isfinite(table).sum(axis=0) * 2 < len(table)] = np.nan
+    both = quantiles(table, [(1 - level) / 2, (1 + level) / 2]).reshape(2, -1)
+    rows, said = dict(zip(("low", "high"), both, strict=True)), "end of the interval for drawn parameters"
+    return {f"{name}_{end}": labelled(over, row, f"{end} {said}", unit) for end, row in rows.items()}
 
 
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:
@@ -239,4 +236,4 @@ class Model:
     def band(self, stack: Any) -> dict[str, np.ndarray]:
         """Low, median and high of the band of draws; NaN, which tells nothing, is passed over."""
         edges = (1 - self.level) / 2, 0.5, (1 + self.level) / 2
-        return dict(zip(("low", "median", "high"), np.nanquantile(np.stack(stack), edges, axis=0), strict=True))
+        return dict(zip(("low", "median", "high"), quantiles(stack, edges), strict=True))

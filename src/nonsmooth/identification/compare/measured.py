@@ -92,24 +92,9 @@ def recorded_motion(
 ) -> xr.Dataset:
     """The readings of states as a motion over the drive's phase, their errors from the record's own irregularity.
 
-    Parameters
-    ----------
-    recording : Recording, Dataset, DataFrame or mapping
-    system : System
-        At its parameters: with the forcing period of the run.
-    channels : mapping of str to str or Sensor, optional
-        Which channel shows which state; channels named as states where not given.
-    run : str, optional
-        Needed where there are several.
-    found : mapping of str to Estimate
-        Unknowns beside the parameters that a fit has found, of all runs or of this one: the phase of the forcing at
-        t = 0, the clock, and gain, offset and delay of a channel that is given by its name alone.
-
-    Raises
-    ------
-    ValueError, TypeError
-        No recording, several runs, outputs among the quantities, channels whose clocks differ, a system without a
-        period.
+    ``system`` is at its parameters, with the forcing period of the run. ``found`` are unknowns beside them that a fit
+    has found, of all runs or of this one: the phase of the forcing at t = 0, the clock, and gain, offset and delay of
+    a channel that is given by its name alone.
     """
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.sensors import Sensor
@@ -230,9 +215,17 @@ def measured_motion(
     # Beyond the first and last turn the phase would be a guess.
     inside = (time >= turns[0]) & (time <= turns[-1])
     phase = (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi)
+    source = recording.source
+    attrs = {
+        "synthetic": "yes" if recording.synthetic else "no",
+        "title": f"{source.get('file') or 'in memory'}, {name}",
+        "run": name,
+        "file": str(source.get("file", "")),
+        "sha256": str(source.get("sha256", "")),
+    }
     return (
         _motion(smoothed.isel(time=inside), phase)
-        .assign_attrs(_attributes(recording, name))
+        .assign_attrs(attrs)
         .assign_coords(
             omega=labelled((), drive.omega, "frequency of the drive", "rad/s"),
             omega_error=labelled((), drive.omega_error, "standard error of it", "rad/s"),
@@ -269,14 +262,3 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     first = smooth(time, x, resolution=step, intensity=rough)
     levels = (quiet["intensity"], quiet["intensity_in_contact"])
     return smooth(time, x, resolution=step, contacts=intervals(first, gap)[:2], intensity=levels)
-
-
-def _attributes(recording: Recording, run: str) -> dict[str, str]:
-    source = recording.source
-    return {
-        "synthetic": "yes" if recording.synthetic else "no",
-        "title": f"{source.get('file') or 'in memory'}, {run}",
-        "run": run,
-        "file": str(source.get("file", "")),
-        "sha256": str(source.get("sha256", "")),
-    }

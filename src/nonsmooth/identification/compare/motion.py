@@ -38,7 +38,11 @@ def compare_motion(
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     noise = model.noise
-    folded, returns = _measured(measured, phases, model.grid)
+    if "u" in measured:
+        turns, u = (measured[name].values.astype(float) for name in ("phase", "u"))
+        folded, returns = fold(turns, u, model.grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
+    else:
+        folded, returns = None, [measured["section"].values.astype(float)]
     sections = [points[np.isfinite(points).all(axis=1)] for points in returns]
     scale = np.maximum(np.concatenate(sections).std(axis=0), noise)
     number = measured_period(returns[0] if folded is None else folded, noise, max_period=model.max_period).number
@@ -67,13 +71,6 @@ def compare_motion(
     return variables | {"section_phase": ("section_phase", np.array(phases), named)}
 
 
-def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[FloatArray | None, list[FloatArray]]:
-    if "u" not in measured:
-        return None, [np.asarray(measured["section"].values, float)]
-    turns, u = np.asarray(measured["phase"].values, float), np.asarray(measured["u"].values, float)
-    return fold(turns, u, grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
-
-
 def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, start: Any) -> Any:
     """The starts given; else rest and measured points at phase 0, so that theory begins where the experiment was.
 
@@ -82,10 +79,10 @@ def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, 
     if start is not None:
         return np.atleast_2d(np.asarray(start, float))
     at_zero = points if folded is None else folded[np.isfinite(folded[:, 0]).all(axis=1), 0]
-    count = 0 if at_zero is None else min(MEASURED_STARTS, len(at_zero))
+    at_zero = np.zeros((0, len(model.states))) if at_zero is None else at_zero
+    count = min(MEASURED_STARTS, len(at_zero))
     starts = np.zeros((1 + count, len(model.theory.states)))
-    if at_zero is not None:
-        starts[1:, model.places] = at_zero[np.linspace(0, len(at_zero) - 1, count).astype(int)]
+    starts[1:, model.places] = at_zero[np.linspace(0, len(at_zero) - 1, count).astype(int)]
     return starts
 
 
@@ -107,17 +104,14 @@ def _clouds(
         "theory_section": labelled((at, "theory_iterate", "state"), np.stack(exact), "predicted section points"),
         "section_scale": labelled("state", scale, "unit of each state in the distances of clouds"),
     }
+    pairs = list(zip(sections, blurred, strict=True))
+    scaled = [(a / scale, b / scale) for a, b in pairs]
     found = [
-        cloud_distance(a / scale, b / scale, splits=model.splits, seed=model.seed)
-        if min(len(a), len(b)) >= 2 * FEWEST_BLOCKS
-        else None
-        for a, b in zip(sections, blurred, strict=True)
+        cloud_distance(a, b, splits=model.splits, seed=model.seed) if min(len(a), len(b)) >= 2 * FEWEST_BLOCKS else None
+        for a, b in scaled
     ]
-    moved = [
-        [wasserstein_distance(a[:, i], b[:, i]) for i in range(len(scale))]
-        for a, b in zip(sections, blurred, strict=True)
-    ]
-    both = [wasserstein(a / scale, b / scale, model.seed) for a, b in zip(sections, blurred, strict=True)]
+    moved = [[wasserstein_distance(*column) for column in zip(a.T, b.T, strict=True)] for a, b in pairs]
+    both = [wasserstein(a, b, model.seed) for a, b in scaled]
     variables["wasserstein_distance"] = labelled(
         (at, "state"), np.array(moved), "Wasserstein distance of the section clouds, in the state's unit"
     )
@@ -147,8 +141,9 @@ def _clouds(
 def _periods(
     number: int, predicted: Prediction, section: FloatArray, scale: FloatArray, states: list[str]
 ) -> dict[str, Any]:
-    words = "the same" if number == predicted.period_number else "others"
-    rows = [(number, section, "measured"), (predicted.period_number, predicted.sections[0], "predicted")]
+    theory = predicted.period_number
+    words = "the same" if number == theory else "others"
+    rows = [(number, section, "measured"), (theory, predicted.sections[0], "predicted")]
     (low, single, _), (high, doubled, whose) = sorted(rows, key=lambda row: row[0])
     if low > 0 and high == 2 * low and (apart := _doubled(single, doubled, scale, low)) is not None:
         by = ", ".join(f"{far:.2g} in {name}" for far, name in zip(apart, states, strict=True))
@@ -157,13 +152,11 @@ def _periods(
     return {
         "measured_period_number": labelled((), np.int64(number), "measured period number (0: none found)"),
         "theory_period_number": labelled(
-            (), np.int64(predicted.period_number), "period number of the nearest predicted motion (0: none found)"
+            (), np.int64(theory), "period number of the nearest predicted motion (0: none found)"
         ),
         "coexisting_period_number": labelled("attractor", coexisting, "period numbers of all predicted motions"),
         "period_agrees": labelled(
-            (),
-            np.int8(number == predicted.period_number),
-            "1 where the nearest predicted motion has the measured period number",
+            (), np.int8(number == theory), "1 where the nearest predicted motion has the measured period number"
         ),
         "period_coexists": labelled(
             (), np.int8(number in coexisting), "1 where the measured period number is among the predicted ones"
@@ -251,22 +244,8 @@ def motion_band(
 ) -> dict[str, Any]:
     """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
 
-    Parameters
-    ----------
-    systems : list of System
-        As the model has drawn them.
-    model : Model
-    nearest : SteadyState
-        The nominal motion; each drawn system begins on it.
-    sections : list of array (n, states)
-        The measured clouds.
-    closed : (measured, predicted) orbits of shape (periods * grid, states), optional
-        Where both motions are periodic.
-
-    Notes
-    -----
-    A draw with another period number has another motion, not a point of the band: ``band_share`` says how many kept
-    theirs.
+    ``closed``: measured and predicted orbit (periods * grid, states), where both motions are periodic. A draw with
+    another period number has another motion, not a point of the band: ``band_share`` says how many kept theirs.
     """
     rng = np.random.default_rng(model.seed)
     draws = len(systems)

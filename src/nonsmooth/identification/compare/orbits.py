@@ -39,22 +39,12 @@ FEWEST_SAMPLES = 8  # per forcing period: fewer do not show an orbit
 
 
 def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
-    """The motion on ``grid`` equal steps of phase in each whole forcing period: (periods, grid, states).
+    """The motion on ``grid`` equal steps of phase in each whole forcing period, the first at phase 0: (periods, grid,
+    states).
 
-    Parameters
-    ----------
-    phase : array (samples,)
-        In forcing periods, rising through all of them.
-    u : array (samples, states)
-        NaN where a sample is missing; a period that touches one is NaN, or an interval of more than a quarter of a
-        period without samples.
-    grid : int
-        Samples per forcing period in the result; the first is at phase 0.
-
-    Raises
-    ------
-    ValueError
-        A phase that does not rise, no whole period, or fewer than eight samples in one.
+    ``phase`` (samples,) rises through all periods, of which each has at least eight samples. Of ``u`` (samples,
+    states) a sample that is missing is NaN; a period that touches one is NaN, or an interval of more than a quarter of
+    a period without samples.
     """
     turns, values = np.asarray(phase, float), np.asarray(u, float)
     rises = np.diff(turns)
@@ -95,17 +85,8 @@ def _cubic(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def mean_orbit(folded: ArrayLike, period_number: int) -> tuple[FloatArray, FloatArray]:
-    """The orbit over ``period_number`` forcing periods, averaged over the record, and the scatter about it.
-
-    Parameters
-    ----------
-    folded : array (periods, grid, states)
-    period_number : int
-
-    Returns
-    -------
-    orbit, scatter : array (period_number * grid, states)
-        Mean, and standard deviation of one pass about it (NaN from a single pass).
+    """The orbit over ``period_number`` forcing periods, averaged over the record (periods, grid, states), and the
+    standard deviation of one pass about it (NaN from a single pass), both (period_number * grid, states).
     """
     values = np.asarray(folded, float)
     passes = len(values) // period_number
@@ -256,18 +237,10 @@ def block_length(points: ArrayLike) -> int:
 def cloud_distance(
     a: ArrayLike, b: ArrayLike, *, splits: int = 400, seed: int = 0, block: int | None = None
 ) -> CloudDistance:
-    """Energy distance of two clouds beside those of their own random halves.
+    """Energy distance of two clouds (points, states) beside those of their own random halves.
 
-    Parameters
-    ----------
-    a, b : array (points, states)
-        Successive section points, in the order in which they came, in one common unit.
-    splits : int
-        Random halves drawn.
-    seed : int
-        Of ``numpy.random.default_rng``.
-    block : int, optional
-        Points that stay together; :func:`block_length` of ``a`` where not given.
+    The points are successive, in one common unit. ``block`` of them stay together: :func:`block_length` of ``a`` where
+    not given.
     """
     x, y = _two_clouds(a, b)
     x, y = x[-MOST:], y[-MOST:]  # thinning would separate successive points

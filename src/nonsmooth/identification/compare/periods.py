@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.arrays import FloatArray, IntArray
 
 BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period is lost
 FEWEST_RETURNS = 4
@@ -46,26 +46,13 @@ class MeasuredPeriod(NamedTuple):
 def measured_period(
     points: ArrayLike, noise: ArrayLike, *, max_period: int = 16, drifting: bool = False
 ) -> MeasuredPeriod:
-    r"""The period number of successive section points with known noise.
+    r"""The period number of successive section points (n, states), of which each has the standard error ``noise``
+    (states,).
 
-    Parameters
-    ----------
-    points : array (n, states) or (n, phases, states)
-        In the order in which they came; NaN where one is missing, across which the others keep their places. Of several
-        phases each has a scaled return, and their median counts: the period is that of the motion, and samples do not
-        tell where it is beside an impact.
-    noise : array (states,)
-        Standard error of a point in each state; positive.
-    max_period : int
-        The longest searched; at least four returns of it must be there.
-    drifting : bool
-        Judge second differences, :math:`s_{k+2p} - 2 s_{k+p} + s_k` over :math:`\sqrt{6} \sigma`, which a motion of
-        period p that drifts evenly leaves at 1, too.
-
-    Raises
-    ------
-    ValueError
-        Too few points for any period, or a noise that is not positive.
+    A point that is NaN is missing, and the others keep their places. Of points (n, phases, states) each phase has a
+    scaled return, and their median counts: the period is that of the motion, and samples do not tell where it is beside
+    an impact. ``drifting``: judge second differences, :math:`s_{k+2p} - 2 s_{k+p} + s_k` over :math:`\sqrt{6} \sigma`,
+    which a motion of period p that drifts evenly leaves at 1, too.
     """
     cloud, sigma = np.asarray(points, float), np.asarray(noise, float)
     cloud = cloud[:, None] if cloud.ndim == 2 else cloud
@@ -99,50 +86,33 @@ def period_numbers(points: ArrayLike, noise: ArrayLike, *, window: int = 24, max
     if len(cloud) < window:
         raise ValueError(f"{len(cloud)} section points are fewer than one window of {window}")
     count = len(cloud) - window + 1
-    numbers = np.array(
-        [
-            measured_period(cloud[i : i + window], noise, max_period=max_period, drifting=True).number
-            for i in range(count)
-        ]
-    )
+    parts = (cloud[i : i + window] for i in range(count))
+    numbers = [measured_period(part, noise, max_period=max_period, drifting=True).number for part in parts]
     return np.pad(numbers, (window // 2, window - 1 - window // 2), mode="edge").astype(np.int64)
 
 
 def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
     """Values at which the period number doubles: ``{"1-2": value, "2-4": value}``.
 
-    Parameters
-    ----------
-    values : array (n,)
-        The parameter, in either order of time.
-    numbers : array (n,)
-        The period number at each; 0 where none was found.
-
-    Notes
-    -----
-    Between the two numbers there may be values where none is found (the motion is slow near a flip, and passes through
-    it with a delay when the parameter moves); the value given is the one that separates the two numbers with the fewest
-    points on the wrong side.
+    Between the two numbers there may be values where none is found, 0 (the motion is slow near a flip, and passes
+    through it with a delay when the parameter moves); the value given is the one that separates the two numbers with
+    the fewest points on the wrong side.
     """
     order = np.argsort(np.asarray(values, float), kind="stable")
     x, n = np.asarray(values, float)[order], np.asarray(numbers)[order]
     found = {}
     for p in (1, 2):
-        is_single, is_double = n == p, n == 2 * p
-        if is_single.any() and is_double.any():
-            found[f"{p}-{2 * p}"] = _parting(x, is_single, is_double)
+        single, double = n == p, n == 2 * p
+        if not (single.any() and double.any()):
+            continue
+        below = double.sum() + np.concatenate([[0], np.cumsum(single.astype(int) - double)])
+        above = single.sum() + double.sum() - below
+        # `below`: misplaced points if doubles lie below the cut and singles above it; `above` the other way round.
+        wrong = below if below.min() <= above.min() else above
+        best = np.flatnonzero(wrong == wrong.min())  # a tie is cut in its middle
+        edges = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
+        found[f"{p}-{2 * p}"] = float(0.5 * (edges[best[0]] + edges[best[-1]]))
     return found
-
-
-def _parting(x: FloatArray, single: BoolArray, double: BoolArray) -> float:
-    """The value with the fewest singles on the doubles' side and the other way round; in the middle of a tie."""
-    below = double.sum() + np.concatenate([[0], np.cumsum(single.astype(int) - double)])
-    above = single.sum() + double.sum() - below
-    # `below`: misplaced points if doubles lie below the cut and singles above it; `above` the other way round.
-    wrong = below if below.min() <= above.min() else above
-    best = np.flatnonzero(wrong == wrong.min())
-    edges = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
-    return float(0.5 * (edges[best[0]] + edges[best[-1]]))
 
 
 FEWEST = 12  # points with a splitting that can be seen
@@ -169,16 +139,7 @@ class MeasuredFlip(NamedTuple):
 def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers: IntArray) -> dict[str, MeasuredFlip]:
     """The flips along a slow and even rise (or fall) of a parameter, ``{"1-2": MeasuredFlip, "2-4": ...}``.
 
-    Parameters
-    ----------
-    at : array (n,)
-        The parameter at each section point, in the order in which they came.
-    points : array (n, states)
-    noise : array (states,)
-        Standard error of a point.
-    numbers : array (n,)
-        The period number at each point, as
-        :func:`nonsmooth.identification.compare.periods.period_numbers` finds it.
+    ``at`` (n,) is the parameter at each section point, ``numbers`` (n,) its period number, by :func:`period_numbers`.
     """
     return {word: _followed(at, points / noise, numbers, word, read) for word, read in flips(at, numbers).items()}
 

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.attractors.mapper import Mapper
@@ -37,22 +36,10 @@ class SteadyState(NamedTuple):
 
 
 class Motions:
-    """Steady motions of systems that differ in their parameters only: one engine, tables for all, no labels.
+    """Steady motions of forced systems that differ in their parameters only: one engine, tables for all, no labels.
 
-    Parameters
-    ----------
-    systems : sequence of System
-    model : Model
-        With transient, longest period, grid and solver, and the states that `cloud`, `orbit` and `carried` return.
-    keep : int
-        See :func:`nonsmooth.sweep`.
-    phase : float
-        Of the stroboscopic section, in forcing periods.
-
-    Raises
-    ------
-    ValueError
-        Systems that are not forced.
+    ``cloud``, ``orbit`` and ``carried`` return the states of the model that are compared; ``phase`` is that of the
+    section.
     """
 
     def __init__(self, systems: Sequence[System], model: Model, *, keep: int, phase: float = 0.0) -> None:
@@ -102,12 +89,7 @@ class Motions:
     def attractors(self, i: int, starts: Any) -> list[SteadyState]:
         """The different motions of system i that the starts settle on, in the order of the starts.
 
-        All motions without a period number count as one. A start that diverges leads to none.
-
-        Raises
-        ------
-        ValueError
-            No start leads to a motion.
+        All motions without a period number count as one. A start that diverges leads to none; ValueError where all do.
         """
         found: list[SteadyState] = []
         orbits: list[FloatArray] = []
@@ -116,14 +98,11 @@ class Motions:
         good = usable(runs.status) & np.isfinite(kept.section).all(axis=(1, 2))
         for points, number in zip(kept.section[good], runs.period_number[good], strict=True):
             size = np.maximum(np.ptp(points, axis=0), 1e-3 * self.system.scale_vector())
-            cycle = points[-max(int(number), 1) :]
-            if any(
-                one.period_number == number and (number == 0 or _apart(cycle[-1], other, size) < SAME)
-                for one, other in zip(found, orbits, strict=True)
-            ):
-                continue
-            found.append(SteadyState(int(number), points[-1].copy()))
-            orbits.append(cycle)
+            same = [orbit for one, orbit in zip(found, orbits, strict=True) if one.period_number == number]
+            away = (np.abs((orbit - points[-1]) / size).max(axis=1).min() for orbit in same)
+            if not any(number == 0 or far < SAME for far in away):
+                found.append(SteadyState(int(number), points[-1].copy()))
+                orbits.append(points[-max(int(number), 1) :])
         if not found:
             words = "; ".join(by_code(code).sentence for code in np.unique(runs.status).tolist())
             raise ValueError(f"no start of {self.system.name!r} leads to a motion that can be compared: {words}")
@@ -143,18 +122,13 @@ class Motions:
 
     def orbit(self, i: int, attractor: SteadyState, periods: int) -> FloatArray:
         """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
-        grid = self.grid
-        end = periods * self.periods[i]
+        grid, end = self.grid, periods * self.periods[i]
         instants = np.linspace(0.0, end, periods * grid + 1)
         state = self._state(attractor.point)
         log = self.engine.record(self._alone(i), state, end, instants)
         check_complete(log, self.system, state, self.periods[i])
         u = log.sample_u[:, self.places]
         return fold(instants / self.periods[i], u, grid)[:periods].reshape(periods * grid, -1)
-
-
-def _apart(point: FloatArray, cycle: FloatArray, size: FloatArray) -> float:
-    return float(np.abs((cycle - point) / size).max(axis=1).min())
 
 
 EXACT = 1e-6  # noise of a computed section point, in parts of the motion's size
@@ -209,16 +183,15 @@ def predict(
 
 
 def from_result(model: Model, phases: list[float]) -> Prediction:
-    """Theory read from a result of ``simulate``, ``poincare`` or ``sweep`` at one setting.
-
-    Raises
-    ------
-    ValueError
-        Neither a motion nor one section cloud.
-    """
+    """Theory read from a result of ``simulate``, ``poincare`` or ``sweep`` at one setting."""
     result = model.theory.sel(state=model.states)
     if "u" in result:
-        turns = _phase(result)
+        if "phase" not in result and "omega" not in result.coords:
+            raise ValueError(
+                "the phase of the drive is not known: give `phase` (in forcing periods) over time, or omega"
+            )
+        phase = result["phase"] if "phase" in result else result["time"] * float(result["omega"]) / (2 * np.pi)
+        turns = np.asarray(phase.values, float)
         whole = fold(turns, result["u"].values, model.grid)
         sections = [fold(turns - phase, result["u"].values, 8)[:, 0] for phase in phases]
         number = _number(whole, model.max_period)
@@ -230,24 +203,13 @@ def from_result(model: Model, phases: list[float]) -> Prediction:
         points = result["section"].squeeze()
         if points.dims != ("iterate", "state"):
             raise ValueError(f"the theory's section has dims {points.dims}; choose one setting, start and direction")
-        number = (
-            int(result["period_number"].squeeze())
-            if "period_number" in result
-            else _number(points.values, model.max_period)
-        )
+        told = result.get("period_number")
+        number = _number(points.values, model.max_period) if told is None else int(told.squeeze())
         return Prediction(number, [points.values], None, np.array([number]))
     raise ValueError(
         f"this Dataset holds neither `u` nor `section` ({', '.join(map(str, result.data_vars))}); give a System, or a "
         "result of simulate, poincare or sweep"
     )
-
-
-def _phase(result: xr.Dataset) -> FloatArray:
-    if "phase" in result:
-        return np.asarray(result["phase"].values, float)
-    if "omega" in result.coords:
-        return np.asarray(result["time"].values * float(result["omega"]) / (2 * np.pi), float)
-    raise ValueError("the phase of the drive is not known: give `phase` (in forcing periods) over time, or omega")
 
 
 def _number(points: FloatArray, max_period: int) -> int:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
-from nonsmooth.identification.compare.draws import Model
+from nonsmooth.identification.compare.draws import Model, intervals
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
 
@@ -38,25 +38,17 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
 
     On the way to a fold the steps grow, so a jump need not be many times its neighbours. It is one where the step is
     larger than both by 2.5 times, and where the steps before and the steps after, each carried on evenly, both leave
-    more than half of it over.
-
-    Parameters
-    ----------
-    x, heights, error : array (n,)
-        Value of the parameter, amplitude and its standard error (0 where it is not known).
+    more than half of it over. ``error``: standard errors of the amplitudes, 0 where not known.
     """
     step = np.diff(heights)
+    beyond = np.pad(step, 1, mode="edge") if len(step) else step  # where there is no further step, one as the last
     found = []
     for i in range(len(step)):
-        beside = [abs(step[j]) for j in (i - 1, i + 1) if 0 <= j < len(step)]
-        if not beside or abs(step[i]) <= STEEPER * max(beside):
+        beside = [(step[j], beyond[2 * j - i + 1]) for j in (i - 1, i + 1) if 0 <= j < len(step)]
+        if not beside or abs(step[i]) <= STEEPER * max(abs(near) for near, _ in beside):
             continue
-        carried = []
-        if i >= 1:
-            carried.append(2 * step[i - 1] - step[i - 2] if i >= 2 else step[i - 1])
-        if i + 1 < len(step):
-            carried.append(2 * step[i + 1] - step[i + 2] if i + 2 < len(step) else step[i + 1])
         least = max(LEAST * max(abs(heights[i : i + 2])), CERTAIN * np.hypot(*error[i : i + 2]))
+        carried = (2 * near - far for near, far in beside)
         if abs(step[i]) <= least or any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
             continue
         middle, half = 0.5 * (x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
@@ -79,30 +71,18 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
     """Pair the jumps of each direction in the order in which they are met, rises with rises and falls with falls.
 
     Where one side has more of a kind, those stay without a partner that leave the sum of the distances least, the
-    order being kept.
-
-    Parameters
-    ----------
-    measured, theory : mapping of direction to sequence of AmplitudeJump
-        In the order of the sweep.
-    drawn : sequence of such mappings
-        The predicted jumps for drawn parameters.
-    unit : str
-    level : float
-        Of the interval in which the drawn jumps lie.
-
-    Returns
-    -------
-    dict
-        Variables over ``jump``: ``jump_direction``, ``measured_jump``, ``theory_jump`` (NaN: no partner),
-        ``jump_difference`` (theory minus measurement), ``jump_tolerance`` (both half steps together: the difference is
-        not known better), and with draws ``theory_jump_low``, ``theory_jump_high``.
+    order being kept. Variables over ``jump``: ``jump_direction``, ``measured_jump``, ``theory_jump`` (NaN: no
+    partner), ``jump_difference`` (theory minus measurement), ``jump_tolerance`` (both half steps together: the
+    difference is not known better), and with draws ``theory_jump_low``, ``theory_jump_high``.
     """
     rows: list[tuple[str, AmplitudeJump, AmplitudeJump]] = []
     nothing = AmplitudeJump(np.nan)
     for word in dict.fromkeys([*measured, *theory]):
-        seen, expected = list(measured.get(word, ())), list(theory.get(word, ()))
-        pairs = _pairs(seen, expected)
+        both = seen, expected = list(measured.get(word, ())), list(theory.get(word, ()))
+        # Jumps as an experimenter read them off do not say whether the amplitude rose.
+        alike = any(np.isnan(jump.after) for jump in seen)
+        kinds = ([alike or jump.after > jump.before for jump in jumps] for jumps in both)
+        pairs = nearest_alike(*([jump.value for jump in jumps] for jumps in both), *kinds)
         rows += [(word, jump, expected[pairs[i]] if i in pairs else nothing) for i, jump in enumerate(seen)]
         rows += [(word, nothing, jump) for j, jump in enumerate(expected) if j not in pairs.values()]
     (m, half), (t, step) = (np.array([row[k][:2] for row in rows], float).reshape(-1, 2).T for k in (1, 2))
@@ -114,23 +94,17 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         "jump_difference": labelled(over, t - m, "predicted minus measured jump", unit),
         "jump_tolerance": labelled(over, half + step, "half steps of both", unit),
     }
-    if drawn:
-        ends = [_interval(jump.value, word, drawn, level) for word, _, jump in rows]
-        for end, column in zip(("low", "high"), np.array(ends, float).reshape(-1, 2).T, strict=True):
-            said = f"{end} end of the interval for drawn parameters"
-            variables[f"theory_jump_{end}"] = labelled(over, column, said, unit)
-    return variables
+    nearest = [[_nearest(one.get(word, ()), jump.value) for word, _, jump in rows] for one in drawn]
+    return variables | intervals("theory_jump", over, nearest, unit, level)
 
 
-def _pairs(seen: list[AmplitudeJump], expected: list[AmplitudeJump]) -> dict[int, int]:
-    """Pairs of predicted and measured jumps."""
-    # Jumps as an experimenter read them off do not say whether the amplitude rose.
-    alike = any(np.isnan(jump.after) for jump in seen)
-    kinds = ([alike or jump.after > jump.before for jump in jumps] for jumps in (seen, expected))
-    return nearest_alike(*([jump.value for jump in jumps] for jumps in (seen, expected)), *kinds)
+def _nearest(jumps: Sequence[AmplitudeJump], value: float) -> float:
+    """The jump that is nearest to a value; NaN where there is none, or no value."""
+    near = min((jump.value for jump in jumps), key=lambda found: abs(found - value), default=np.nan)
+    return near if np.isfinite(value) else np.nan
 
 
-def nearest_alike(ours: Any, theirs: Any, our_kinds: Sequence[Any], their_kinds: Sequence[Any]) -> dict[int, int]:
+def nearest_alike(ours: Any, theirs: Any, our_kinds: Any, their_kinds: Any) -> dict[int, int]:
     """Pairs of values of one kind, by their places, so that the sum of their distances is least; the order is kept."""
     from scipy.optimize import linear_sum_assignment
 
@@ -147,20 +121,6 @@ def nearest_alike(ours: Any, theirs: Any, our_kinds: Sequence[Any], their_kinds:
     return pairs
 
 
-def _interval(value: float, word: str, drawn: Sequence[Jumps], level: float) -> tuple[float, float]:
-    """Quantiles of the drawn jump nearest to this one; NaN where fewer than half of the draws have one."""
-    if not drawn or not np.isfinite(value):
-        return np.nan, np.nan
-    near = [
-        min((jump.value for jump in one.get(word, ())), key=lambda v: abs(v - value), default=np.nan) for one in drawn
-    ]
-    held = np.array(near)[np.isfinite(near)]
-    if 2 * len(held) < len(drawn):
-        return np.nan, np.nan
-    low, high = np.quantile(held, [(1 - level) / 2, (1 + level) / 2])
-    return float(low), float(high)
-
-
 FINE = 301  # values of the predicted curve
 
 
@@ -169,17 +129,29 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
 
     ``own`` is the unit of the state."""
     runs = _runs(measured, name, state)
-    unit = measured[name].attrs.get("units", "1")
+    unit, at_runs = measured[name].attrs.get("units", "1"), np.full(len(runs["value"]), np.nan)
     directions = [word for word in ("up", "down") if (runs["direction"] == word).any()]
+    parts = [runs["direction"] == word for word in directions]
+
+    def predicted(system: System) -> tuple[FloatArray, FloatArray]:
+        """The curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
+        curves, at_runs = np.empty((len(values), len(directions))), np.full(len(runs["value"]), np.nan)
+        how: dict[str, Any] = {"transient": model.transient, "keep": 32, "progress": False, **model.solver}
+        for d, (word, mine) in enumerate(zip(directions, parts, strict=True)):
+            every = np.union1d(values, runs["value"][mine])
+            result = sweep(system, name, every, **how | {"direction": word})
+            heights = 0.5 * (result["maximum"] - result["minimum"]).sel(state=state).values
+            curves[:, d] = heights[np.searchsorted(every, values)]
+            at_runs[mine] = heights[np.searchsorted(every, runs["value"][mine])]
+        return curves, at_runs
+
     if model.system is None:
         values, curves = _given(model.theory, name, state, directions)
-        at_runs = np.full(len(runs["value"]), np.nan)
-        for d, word in enumerate(directions):
-            mine = runs["direction"] == word
-            at_runs[mine] = np.interp(runs["value"][mine], values, curves[:, d])
+        for mine, curve in zip(parts, curves.T, strict=True):
+            at_runs[mine] = np.interp(runs["value"][mine], values, curve)
     else:
         values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
-        curves, at_runs = _curves(model.system, model, name, state, values, runs, directions)
+        curves, at_runs = predicted(model.system)
     variables = {
         f"measured_{name}": labelled("run", runs["value"], f"measured {name}", unit),
         "measured_direction": labelled("run", runs["direction"], "direction in which the run was reached"),
@@ -199,12 +171,8 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
     drawn_jumps: list[Jumps] = []
     if model.system is not None and model.draws:
         systems, drawn = model.drawn()
-        stack, stack_runs = [], []
-        for one in systems:
-            curve, points = _curves(one, model, name, state, values, runs, directions)
-            stack.append(curve)
-            stack_runs.append(points)
-            drawn_jumps.append(_jumps(values, curve, directions))
+        stack, stack_runs = zip(*map(predicted, systems), strict=True)
+        drawn_jumps = [_jumps(values, curve, directions) for curve in stack]
         for word, curve in model.band(stack).items():
             variables[f"theory_{word}"] = labelled((name, "direction"), curve, f"{word} of the band", own)
         band, reach = model.band(stack_runs), 2 * np.nan_to_num(runs["error"])
@@ -234,30 +202,6 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
     columns = {"value": name, "amplitude": "amplitude", "error": "amplitude_error", "period": "period_number"}
     direction = {"direction": frame["direction"].to_numpy(str)}
     return direction | {key: frame[column].to_numpy() for key, column in columns.items()}
-
-
-def _curves(
-    system: System,
-    model: Model,
-    name: str,
-    state: str,
-    values: FloatArray,
-    runs: dict[str, NDArray[Any]],
-    directions: list[Any],
-) -> tuple[FloatArray, FloatArray]:
-    """The predicted curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
-    curves = np.empty((len(values), len(directions)))
-    at_runs = np.full(len(runs["value"]), np.nan)
-    for d, word in enumerate(directions):
-        mine = runs["direction"] == word
-        every = np.union1d(values, runs["value"][mine])
-        result = sweep(
-            system, name, every, direction=word, transient=model.transient, keep=32, progress=False, **model.solver
-        )
-        heights = 0.5 * (result["maximum"] - result["minimum"]).sel(state=state).values
-        curves[:, d] = heights[np.searchsorted(every, values)]
-        at_runs[mine] = heights[np.searchsorted(every, runs["value"][mine])]
-    return curves, at_runs
 
 
 def _given(theory: xr.Dataset, name: str, state: str, directions: list[str]) -> tuple[FloatArray, FloatArray]:

@@ -63,8 +63,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     for motion in motions:
         folded = fold(motion["phase"].values, motion["u"].values, 64)
         periods.append(_period_of(motion, folded, 8))
-        whole = folded[:, :, 0]
-        whole = whole[min(settle, len(whole) - 1) :]
+        whole = folded[min(settle, len(folded) - 1) :, :, 0]
         whole = whole[np.isfinite(whole).all(axis=1)]
         # Pairs of periods, so that a motion of period two shows its whole range.
         pairs = whole[: len(whole) // 2 * 2].reshape(-1, 2 * whole.shape[1]) if len(whole) > 1 else whole

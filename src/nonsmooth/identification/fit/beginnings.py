@@ -43,12 +43,7 @@ def beginnings(
 ) -> tuple[FloatArray, FloatArray] | None:
     """Unknowns and starts (records, n_u) that follow the beginning of every record; None where none were found.
 
-    Parameters
-    ----------
-    length : float
-        Of first windows.
-    start : array (records, n_u), optional
-        First guess of the starts.
+    ``length`` is that of first windows, ``start`` (records, n_u) a first guess of the starts.
     """
     first: dict[int, Window] = {}
     for window in first_windows(problem, problem.unknowns.guess, length, start, True):

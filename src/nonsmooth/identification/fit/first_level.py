@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray
-from nonsmooth.errors import SolveError, shortened, unknown
+from nonsmooth.errors import SolveError, check_keys, shortened
 from nonsmooth.identification.arrow import Residuals, settle
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
@@ -104,13 +104,7 @@ _FITTED = 2  # of these
 
 
 def read_modes(system: System, given: Any, runs: Sequence[str]) -> list[tuple[int, ...]]:
-    """The modes in which each run may begin, the first guess first: all, or the one that is given.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A mode or a run that does not exist.
-    """
+    """The modes in which each run may begin, the first guess first: all, or the one that is given."""
     modes = list(system.modes)
     if given is None:
         return [tuple(range(len(modes)))] * len(runs)
@@ -118,11 +112,8 @@ def read_modes(system: System, given: Any, runs: Sequence[str]) -> list[tuple[in
         given = dict.fromkeys(runs, given)
     if not isinstance(given, Mapping):
         raise TypeError(f"mode = {shortened(given)}: allowed are the name of a mode, and a mapping of run to names")
-    for run, name in given.items():
-        if run not in runs:
-            raise ValueError(f"mode: {unknown(run, 'a run', 'this recording', list(runs))}")
-        if name not in modes:
-            raise ValueError(f"mode: {unknown(name, 'a mode', repr(system.name), modes)}")
+    check_keys(given, runs, "mode", "a run", "this recording")
+    check_keys(given.values(), modes, "mode", "a mode", repr(system.name))
     return [(modes.index(given[run]),) if run in given else tuple(range(len(modes))) for run in runs]
 
 
@@ -149,18 +140,13 @@ def other_beginnings(stage: Stage, i: int) -> list[tuple[float, Window, FloatArr
     rng, found = np.random.default_rng(0), []
     for mode in problem.modes[window.record]:
         other, trials = replace(window, mode=mode), [start, np.where(known, told, start)]
-        if mode == window.mode or not _stays(stage, other, trials):
-            continue
+        begun = (problem.motion(stage.theta, other, z) for z in trials) if mode != window.mode else ()
+        if not any(motion is not None and int(motion.log.sample_mode[0]) == mode for motion in begun):
+            continue  # the mode that is tried already, or one that a condition ends at once
         reach = np.where(known, 0.0, 0.2) * window.spread
-        trials += [trials[k % 2] + reach * rng.standard_normal(len(reach)) for k in range(_TRIED if reach.any() else 0)]
+        trials += [trials[k % 2] + reach * rng.standard_normal(len(reach)) for k in range(_TRIED * reach.any())]
         found += alone(stage, [(other, z) for z in trials], _FITTED)[:1]
     return found
-
-
-def _stays(stage: Stage, window: Window, starts: list[FloatArray]) -> bool:
-    """Return whether a motion may begin in the mode of this window: no condition ends it at once."""
-    begun = (stage.problem.motion(stage.theta, window, start) for start in starts)
-    return any(motion is not None and int(motion.log.sample_mode[0]) == window.mode for motion in begun)
 
 
 _ROUNDS = 10
@@ -171,13 +157,7 @@ _DRAWN = 60  # starts drawn for such a window
 
 
 def settle_first(problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool) -> Stage:
-    """The fit over windows of this length.
-
-    Raises
-    ------
-    SolveError
-        If no window of the record can be simulated.
-    """
+    """The fit over windows of this length; SolveError if no window of the record can be simulated."""
     now = problem.of(first_windows(problem, theta, length, start, free))
     if not now.pieces:
         raise SolveError("the motion of the first guess ends before any window of the record does")

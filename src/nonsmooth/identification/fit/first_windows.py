@@ -24,12 +24,11 @@ WIDE = 3.0  # a start may move by so many times the size of its state
 
 def first_length(problem: Windows) -> float:
     """Length of the first windows: a part of a swing to and fro, and samples enough for a start."""
-    found = []
-    n = problem.marcher.flow.n
+    found, least = [], 3 * problem.marcher.flow.n + 6  # samples
     for record in problem.records:
         columns = [y[np.isfinite(y)] for y in record.values.T]
-        longest = _OF_A_SWING * 2.0 * record.duration / max(min([turns_of(y) for y in columns if len(y)]), 4)
-        found.append(max(longest, (3 * n + 6) * record.duration / (len(record.time) - 1)))
+        swing = 2.0 * record.duration / max(min(turns_of(y) for y in columns if len(y)), 4)
+        found.append(max(_OF_A_SWING * swing, least * record.duration / (len(record.time) - 1)))
     return float(np.median(found))
 
 
@@ -50,20 +49,22 @@ def first_windows(
 ) -> list[Window]:
     """Windows of about ``length``, each beginning as far as may be from a transition.
 
-    Parameters
-    ----------
-    start : array (records, n_u), optional
-        First guess of the states at the beginning of each record, or their values where not ``free``.
+    ``start`` (records, n_u): first guess of the states at the beginning of each record, or their values where not
+    ``free``.
     """
     n_u, memory = len(problem.system.states), problem.system.memory_vector()
     found: list[Window] = []
     for i, record in enumerate(problem.records):
-        early = _lead(problem, theta, i)
+        here, u = problem.at(theta, i), problem.unknowns
+        early = float(max(here.delays.max(), 0.0))  # a window begins by the longest delay before its first sample
+        for k, (_, what) in zip(u.places[i][len(u.active) :], u.sensors, strict=False):
+            if what == "delay":
+                most, step = float(u.high[k]), float(np.median(np.diff(record.time)))
+                early = max(early, most if np.isfinite(most) else early + 10 * step)
         told = states_from_samples(problem, theta, i, slice(None))
         z = np.concatenate([np.zeros(n_u) if start is None else start[i], memory])
-        if (there := problem.at(theta, i)).values is None:
+        if here.values is None:
             continue
-        which = problem.unknowns.places[i]
         sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
         time, mode, first, windows = record.time, problem.modes[i][0], 0, []
         while first < len(time) - 1:
@@ -75,7 +76,7 @@ def first_windows(
             set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
             begin = float(time[first]) - early
             for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
-                motion = problem.march(theta, i, begin, there.clock * (time[first:end] - early), candidate, mode)
+                motion = problem.march(theta, i, begin, here.clock * (time[first:end] - early), candidate, mode)
                 if motion is not None:
                     break
             if motion is None:  # the samples of this window come back when windows are joined
@@ -86,7 +87,7 @@ def first_windows(
             spread = np.zeros(len(z)) if first == 0 and not free else np.append(np.ones(n_u), np.zeros(len(memory)))
             if np.isfinite(record.values[first:last]).any():  # a gap is bridged where windows are joined
                 t, y = time[first:last], record.values[first:last]
-                windows.append(Window(i, first, last, begin, candidate, spread, mode, which, t, y))
+                windows.append(Window(i, first, last, begin, candidate, spread, mode, u.places[i], t, y))
             if last == len(time):
                 break
             z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])
@@ -95,16 +96,6 @@ def first_windows(
         wide[problem.system._description.n_own : n_u] = 0.0  # inputs are known
         found += [replace(window, spread=window.spread * wide) for window in windows]
     return found
-
-
-def _lead(problem: Windows, theta: FloatArray, run: int) -> float:
-    """Time by which a window begins before its first sample: the longest delay that the fit may try."""
-    lead, u = float(max(problem.at(theta, run).delays.max(), 0.0)), problem.unknowns
-    for k, (_, what) in zip(u.places[run][len(u.active) :], u.sensors, strict=False):
-        if what == "delay":
-            most, step = float(u.high[k]), float(np.median(np.diff(problem.records[run].time)))
-            lead = max(lead, most if np.isfinite(most) else lead + 10 * step)
-    return lead
 
 
 def _quiet(time: FloatArray, crossings: FloatArray, length: float) -> int:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Unpack
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError, unknown
+from nonsmooth.errors import SolveError, check_keys
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.fit.beginnings import beginnings, drawn
@@ -152,10 +152,16 @@ def fit(
     """
     problem = problem_of(system, recording, parameters, options, mode, loss, per_run, inputs)
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
-    begin = _begun(problem, start, free, leave_out)
-    for name in profile:
-        if name not in problem.unknowns.names:
-            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
+    if start is not None and not is_one_start(start):
+        raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
+    if not free and start is None:
+        raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
+    if leave_out and not problem.records:
+        raise ValueError("leave_out=True leaves out parts of records over time; readings of steady states have none")
+    if leave_out and not free:
+        raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
+    begin = None if start is None else np.tile(start_states(problem.system, start)[0], (len(problem.records), 1))
+    check_keys(profile, problem.unknowns.names, "profile", "an unknown", "this fit")
     best, left = best_of(problem, begin, free, window or np.inf, tries, seed, progress), list[str]()
     if leave_out:
         problem, left = without_disagreeing(problem, best.theta)
@@ -172,19 +178,6 @@ def fit(
         left=left,
         beside=[posterior_of(best, posterior, seed, progress)] if posterior else [],
     )
-
-
-def _begun(problem: Windows, start: Any, free: bool, leave_out: bool) -> FloatArray | None:
-    """The first guess of the states of each record; ValueError where what is said of the starts does not fit."""
-    if start is not None and not is_one_start(start):
-        raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
-    if not free and start is None:
-        raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
-    if leave_out and not problem.records:
-        raise ValueError("leave_out=True leaves out parts of records over time; readings of steady states have none")
-    if leave_out and not free:
-        raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
-    return None if start is None else np.tile(start_states(problem.system, start)[0], (len(problem.records), 1))
 
 
 def problem_of(

@@ -111,24 +111,11 @@ def grow(
     longest: float,
     told: Callable[[], None],
 ) -> Grown:
-    """Fit from a first guess.
+    """Fit from a first guess; SolveError if not even the first windows can be fitted.
 
-    Parameters
-    ----------
-    problem : Windows
-        Without windows; ``noise`` a first estimate.
-    theta : array (p,)
-    length, longest : float
-        Of the first windows, and of the longest ones.
-    start, free
-        See :func:`first_windows`.
-    told : callable
-        Called once a level is done.
-
-    Raises
-    ------
-    SolveError
-        If not even the first windows can be fitted.
+    ``problem`` is without windows, its ``noise`` a first estimate; ``length`` and ``longest`` are those of the first
+    windows and of the longest ones; ``start`` and ``free`` as in :func:`first_windows`; ``told`` is called once a
+    level is done.
     """
     near = _at_once(problem, theta, start, free, longest)
     if near is not None:
@@ -138,11 +125,11 @@ def grow(
     told()
     wide, poor, stuck = length, _reduced(stage) > POOR, False
     while not poor and len(stage.problem.pieces) > len(problem.records) and wide < longest:
-        for factor in (4.0, 2.0):
-            longer = _longer_windows(stage, min(factor * wide, longest))
+        for wider in (min(factor * wide, longest) for factor in (4.0, 2.0)):
+            longer = _longer_windows(stage, wider)
             told()
             if longer is not None:
-                stage, wide = longer, min(factor * wide, longest)
+                stage, wide = longer, wider
                 break
         else:
             stuck = _spreads(stage) < _REGULAR

@@ -16,6 +16,7 @@ from nonsmooth.errors import SolveError, not_installed
 from nonsmooth.identification.arrow import Unsettled, concerned, inverted, reduced, settle
 from nonsmooth.identification.finding import Estimate, Finding, normal_draws
 from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.recordings.signals.sections import first_zero
 from nonsmooth.results.progress import Progress, progress
 
 
@@ -27,19 +28,8 @@ def limits_of(values: FloatArray, rise: FloatArray, best: float, *, level: float
     """
     from scipy.stats import chi2
 
-    bound, middle = float(chi2.ppf(level, 1)), int(np.argmin(np.abs(values - best)))
-    low = _crossed(values[middle::-1], rise[middle::-1], bound)
-    return low, _crossed(values[middle:], rise[middle:], bound)
-
-
-def _crossed(values: FloatArray, rise: FloatArray, bound: float) -> float:
-    """Value at which the rise of chi^2 from the best value passes the bound; NaN where it does not."""
-    over = np.flatnonzero(rise > bound)
-    if len(over) == 0 or over[0] == 0:
-        return float("nan")
-    i = int(over[0])
-    part = (bound - rise[i - 1]) / (rise[i] - rise[i - 1])
-    return float(values[i - 1] + part * (values[i] - values[i - 1]))
+    beyond, middle = rise - float(chi2.ppf(level, 1)), int(np.argmin(np.abs(values - best)))
+    return first_zero(values[middle::-1], beyond[middle::-1]), first_zero(values[middle:], beyond[middle:])
 
 
 _STEP = 0.5  # of a standard uncertainty
@@ -56,12 +46,8 @@ def profiled(
 ) -> list[Finding]:
     """A finding for each of these unknowns.
 
-    Parameters
-    ----------
-    normal : array (p, p)
-        The normal matrix, priors included; its inverse would be the covariance of white residuals.
-    covariance : array (p, p)
-        That of the fit, by which the rise of chi^2 is scaled.
+    ``normal`` (p, p) is the normal matrix, priors included: its inverse would be the covariance of white residuals. By
+    the ``covariance`` of the fit the rise of chi^2 is scaled.
     """
     u, white, found = grown.problem.unknowns, np.diag(inverted(normal)[0]), []
     with progress(2 * len(names), "profiles", watched) as advance:
@@ -75,7 +61,7 @@ def profiled(
             values, rise = np.array(sorted([*above, (float(grown.theta[i]), 0.0)])).T
             best = values[np.argmin(rise)]  # a better fit than the best, where the sum of squares has corners
             rise = rise - rise.min()
-            estimate = Estimate(float(grown.theta[i]), error, u.units[i])
+            estimate = Estimate(grown.theta[i], error, u.units[i])
             ends = dict(zip(("low", "high"), limits_of(values, rise, best), strict=True))
             low, high = (f"{end:.4g}" if np.isfinite(end) else "no limit" for end in ends.values())
             by_error = " to ".join(f"{end:.4g}" for end in estimate.interval())
@@ -128,12 +114,7 @@ SAMPLED = (
 def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Finding:
     """Draws of the unknowns from their posterior; a note says whether there are enough.
 
-    Raises
-    ------
-    ImportError
-        Without emcee.
-    SolveError
-        Windows so many that an ensemble does not move, or a direction that nothing determines.
+    SolveError for windows so many that an ensemble does not move, or a direction that nothing determines.
     """
     try:
         import emcee
@@ -175,8 +156,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
     thin = max(1, int(tau / 5)) if np.isfinite(tau) else 1
     draws = sampler.get_chain(discard=int(_BURNT * steps), thin=thin, flat=True)[:, :p]
     rows = {
-        name: Estimate(float(np.mean(draws[:, i])), float(np.std(draws[:, i], ddof=1)), u.units[i])
-        for i, name in enumerate(u.names)
+        name: Estimate(np.mean(draws[:, i]), np.std(draws[:, i], ddof=1), u.units[i]) for i, name in enumerate(u.names)
     }
     notes = [
         f"{walkers} walkers, {steps} steps, the first {_BURNT:.0%} left out, every {thin}th kept; the chains forget "

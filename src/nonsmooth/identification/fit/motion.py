@@ -49,14 +49,7 @@ class SampledMotion:
 
 
 class Marcher:
-    """Marches windows of one system.
-
-    Parameters
-    ----------
-    system : System
-    active : tuple of str
-        The parameters in which to differentiate.
-    """
+    """Marches windows of one system, and differentiates in its ``active`` parameters."""
 
     def __init__(self, system: System, active: tuple[str, ...]) -> None:
         self.system, self.traced = system, system.traced

@@ -230,28 +230,22 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         if excess < BETTER:
             words = f"chi^2 is only {excess:.2g} higher in another: the readings do not tell which"
         notes.append(f"{label} in mode {modes[mode]!r}; {words}")
-    notes += _far_from_guess(grown)
+    u = problem.unknowns
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factors = np.abs(grown.theta / u.guess)
+        decades = np.abs(np.log10(factors))
+    k = int(np.argmax(np.where(np.isfinite(decades), decades, 0.0)))
+    if _DECADES < decades[k] < np.inf:
+        notes.append(
+            f"{u.names[k]} is {factors[k]:.2g} times its first guess: if that was more than a guess, see whether the "
+            "record's times and readings are in the units of the model"
+        )
     places = [row for row in by_place(data) if row[2] >= 5]
     if len(places) > 1:
         notes.append(
             "rms of the residuals, over all: 1; " + "; ".join(f"{name}: {rms:.2f}" for name, rms, _ in places[:4])
         )
     return notes
-
-
-def _far_from_guess(grown: Grown) -> list[str]:
-    """A sentence on the parameter that is decades away from its first guess."""
-    u = grown.problem.unknowns
-    with np.errstate(divide="ignore", invalid="ignore"):
-        factors = np.abs(grown.theta / u.guess)
-        decades = np.abs(np.log10(factors))
-    k = int(np.argmax(np.where(np.isfinite(decades), decades, 0.0)))
-    if not _DECADES < decades[k] < np.inf:
-        return []
-    return [
-        f"{u.names[k]} is {factors[k]:.2g} times its first guess: if that was more than a guess, see whether the "
-        "record's times and readings are in the units of the model"
-    ]
 
 
 def _length(grown: Grown) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError, unknown
+from nonsmooth.errors import SolveError, check_keys
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.identification.arrow import concerned, inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
@@ -105,8 +105,7 @@ def plan_experiment(
         if not size > 0:
             raise ValueError(f"measured[{name!r}] says no noise: give ns.Sensor(noise=...) or resolution=")
     for name, run in runs.items():
-        for key in sorted(run.keys() - {*_OF_A_RUN}):
-            raise ValueError(f"runs[{name!r}]: {unknown(key, 'a property', 'a run', _OF_A_RUN)}")
+        check_keys(run, _OF_A_RUN, f"runs[{name!r}]", "a property", "a run")
     rows = [_information(system, str(name), run, parameters, sensors, noise, options) for name, run in runs.items()]
     names, _, precision, theta = rows[-1]
     found = [told for _, told, *_ in rows]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import shortened, unknown
+from nonsmooth.errors import check_keys, shortened, unknown
 from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_steady
@@ -65,21 +65,16 @@ def irregularity(y: FloatArray, moving: bool = False) -> float:
 def read_records(
     system: System, recording: Any, options: Mapping[str, Any], inputs: Any = None
 ) -> tuple[dict[str, Sensor], list[Record], tuple[SteadyReadings, ...]]:
-    """The sensors and the records of a recording, and its readings of steady states; ``options`` as of `Recorded`.
-
-    Raises
-    ------
-    ValueError, TypeError
-        Something that is no recording, channels that do not exist, times that do not increase, too few samples.
-    """
+    """The sensors and the records of a recording, and its readings of steady states; ``options`` as of `Recorded`."""
     runs, measured = options.get("runs"), options.get("measured")
     given = list(recording) if isinstance(recording, list | tuple) else [recording]
     if not given:
         raise ValueError(f"the list of recordings is empty; give {FORMS}")
     tables: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
     still = {f"{i}" if len(given) > 1 else "steady": one for i, one in enumerate(given) if is_steady(one)}
+    clock = options.get("time", "time")
     for i, one in enumerate(given):
-        found = {} if is_steady(one) else _tables(one, runs, options.get("time", "time"))
+        found = {} if is_steady(one) else _tables(one, runs, clock)
         for name, table in found.items():
             label = name if len(given) == 1 else f"{i}" if len(found) == 1 else f"{i} {name}"
             tables[label] = table
@@ -90,7 +85,7 @@ def read_records(
     channels = list(dict.fromkeys(name for table in tables.values() for name in table))
     quantities = [] if tables else [q for one in steady for q in one.quantities]
     sensors = read_sensors(system, measured, channels or quantities)
-    units, clock = [_units(one) for one in given], options.get("time", "time")
+    units = [_units(one) for one in given]
     ours = {**system.states, **system.outputs}
     _compare_units("recording", clock, units, "s" if any(system.states.values()) else "", "times in that unit")
     for quantity, sensor in sensors.items():
@@ -106,10 +101,7 @@ def read_records(
     for label, table in tables.items():
         columns = []
         for quantity, sensor in sensors.items():
-            if sensor.channel not in table:
-                raise ValueError(
-                    f"measured[{quantity!r}]: {unknown(sensor.channel, 'a channel', f'run {label!r}', list(table))}"
-                )
+            check_keys([sensor.channel], table, f"measured[{quantity!r}]", "a channel", f"run {label!r}")
             columns.append(table[sensor.channel])
         records.append(replace(_joined(label, columns, per_run[label]), drive=_driven(system, inputs, label, table)))
     for c, (quantity, sensor) in enumerate(sensors.items()):
@@ -158,8 +150,7 @@ def _driven(
     for name, one in inputs.items():
         one = Input(one) if isinstance(one, str) else one
         if isinstance(one, Input) and isinstance(one.time, str):
-            if one.time not in table:
-                raise ValueError(f"inputs[{name!r}]: {unknown(one.time, 'a channel', f'run {label!r}', list(table))}")
+            check_keys([one.time], table, f"inputs[{name!r}]", "a channel", f"run {label!r}")
             one = replace(one, time=table[one.time][0], values=table[one.time][1])
         found[name] = one
     return driven(system, found)
@@ -173,8 +164,8 @@ def _joined(label: str, columns: list[tuple[FloatArray, FloatArray]], settings: 
         raise ValueError(f"run {label!r} has {len(time)} samples; a fit needs at least 8: give a longer record")
     values = np.full((len(time), len(kept)), np.nan)
     for c, (t, y) in enumerate(kept):
-        if (np.diff(t) <= 0).any():
-            where = int(np.flatnonzero(np.diff(t) <= 0)[0])
+        if len(back := np.flatnonzero(np.diff(t) <= 0)):
+            where = back[0]
             raise ValueError(
                 f"run {label!r}: the time must increase from sample to sample; sample {where + 1} is at "
                 f"{t[where + 1]:.9g} after {t[where]:.9g}: sort the samples, or give each run by itself"
@@ -188,9 +179,8 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
     if isinstance(one, Recording):
         wanted = one.runs if runs is None else [runs] if isinstance(runs, str) else runs
         found: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
+        check_keys(wanted, one.runs, "runs", "a run", "this recording")
         for run in wanted:
-            if run not in one.runs:
-                raise ValueError(f"runs: {unknown(run, 'a run', 'this recording', list(one.runs))}")
             found[run] = {}
             for leaf in one.tree.children[run].children.values():
                 for name, array in leaf.to_dataset().data_vars.items():
@@ -266,9 +256,8 @@ def _settings(system: System, settings: Any, labels: list[str]) -> dict[str, dic
     if not all(isinstance(one, Mapping) for one in settings.values()):
         settings = dict.fromkeys(labels, settings)
     units = {key: parameter.unit for key, parameter in system.parameters.items()}
-    for label, own in settings.items():
-        if label not in labels:
-            raise ValueError(f"settings: {unknown(label, 'a run', 'this recording', labels)}")
+    check_keys(settings, labels, "settings", "a run", "this recording")
+    for own in settings.values():
         for name in own:
             if name not in system.values:
                 raise ValueError(f"settings: {unknown(name, 'a parameter', repr(system.name), units)}")

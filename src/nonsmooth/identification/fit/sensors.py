@@ -83,13 +83,7 @@ class Sensor:
 
 
 def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict[str, Sensor]:
-    """The measured quantities with their sensors.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A name that is no state and no output; nothing measured.
-    """
+    """The measured quantities, states or outputs of the system, with their sensors."""
     own = list(system.states)[: system._description.n_own]
     known = {name: system.states[name] for name in own} | dict(system.outputs)
     if measured is None:
@@ -119,16 +113,7 @@ def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict
 
 
 class Observable:
-    """A state or an output of a system along a motion, with its derivatives.
-
-    Parameters
-    ----------
-    system : System
-    name : str
-        A state or an output.
-    places : sequence of int
-        Places of the active parameters among the system's.
-    """
+    """A state or an output of a system along a motion, with its derivatives in the parameters at these places."""
 
     def __init__(self, system: System, name: str, places: Sequence[int]) -> None:
         self.system, self.places = system, tuple(places)

@@ -17,8 +17,10 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.errors import unknown
+from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
 from nonsmooth.system.kinds import float_array
@@ -118,14 +120,7 @@ def of_table(system: System, one: Any, name: str) -> xr.Dataset:
 
 
 def read_steady(system: System, one: Any, name: str, measured: Any, settings: Mapping[str, float]) -> SteadyReadings:
-    """Readings of a response or of sections.
-
-    Raises
-    ------
-    ValueError
-        A system without forcing, a parameter that is missing, quantities that are no states, sections without period
-        numbers.
-    """
+    """Readings of a response or of sections; ValueError that says what is missing of them, or of the system."""
     if system.period() is None or system.inputs:
         why = "inputs" if system.inputs else "no forcing period"
         raise ValueError(f"{system.name!r} has {why}; a response and sections are of steady states under a forcing")
@@ -197,16 +192,11 @@ def predicted(
     """Predicted readings of the sensors (N,), whether the motion is periodic, and the derivatives
     (N, n_active + 2): in the active parameters, in the sensor's gain and in its offset. NaN where no motion comes to
     its end."""
-    from nonsmooth.attractors.settled import usable
-    from nonsmooth.attractors.settler import Settler
-    from nonsmooth.flow.sections import Stroboscopic, section_plan
-
     system, count, a = marcher.system, len(one.values), marcher.flow.n_active
     points = np.tile(values, (count, 1))
     points[:, one.places] = one.values
-    settler = Settler(
-        system, marcher.engine, section_plan(system, Stroboscopic(0.0))[1], TRANSIENT, KEPT, LONGEST, False
-    )
+    plan = section_plan(system, Stroboscopic(0.0))[1]
+    settler = Settler(system, marcher.engine, plan, TRANSIENT, KEPT, LONGEST, False)
     rows = np.concatenate([np.arange(count), np.arange(count)[::-1]])
     found = settler.run(points, rows, np.repeat(start_states(system, None)[:1], len(rows), axis=0), carried=True)
     columns = [list(system.states).index(name) for name in one.quantities]
@@ -225,13 +215,10 @@ def predicted(
         for job in (i, 2 * count - 1 - i):
             if not good[job]:
                 continue
-            if one.amplitude:
-                raw, ahead = 0.5 * (found.maximum[job] - found.minimum[job])[None, columns], 1
-            else:
-                raw, ahead = (
-                    _points(settler, points[i], found, job, shape[0])[:, columns],
-                    int(found.period_number[job]),
-                )
+            raw, ahead = 0.5 * (found.maximum[job] - found.minimum[job])[None], 1
+            if not one.amplitude:
+                raw, ahead = _points(settler, points[i], found, job, shape[0]), int(found.period_number[job])
+            raw = raw[:, columns]
             for shift in range(max(ahead, 1)):
                 y = raw[shift : shift + shape[0]]
                 far = float(np.sum(((one.measured[mine] - (gain * y + offset).ravel()) / one.noise[mine]) ** 2))
@@ -330,6 +317,6 @@ def _extreme(motion: SampledMotion, k: int, sign: float) -> float:
     i = 1 + np.argmax(y[1:-1])
     if motion.segment[i - 1] != motion.segment[i + 1]:
         return float(t[i])
-    one, other = t[i] - t[i - 1], t[i + 1] - t[i]
-    down, up = (y[i] - y[i - 1]) / one, (y[i + 1] - y[i]) / other
+    one, other = np.diff(t[i - 1 : i + 2])
+    down, up = np.diff(y[i - 1 : i + 2]) / (one, other)
     return float(t[i] + 0.5 * (down * other + up * one) / (down - up)) if down > up else float(t[i])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import shortened, unknown
+from nonsmooth.errors import check_keys, shortened, unknown
 from nonsmooth.identification.fit.sensors import OF_A_SENSOR, Sensor
 from nonsmooth.system.kinds import ends, real_number
 from nonsmooth.system.system import System
@@ -76,15 +76,16 @@ def read_unknowns(
     """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own; the last
     ``steady`` runs have no phase. A parameter that is set in a run is known there; one that is called ``clock`` or
     ``phase`` is a parameter as any other.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A name that is no parameter, of no sensor, or twice there; bounds that the first guess is not within.
     """
     given = [parameters] if isinstance(parameters, str) else list(parameters)
     bounds = dict(parameters) if isinstance(parameters, Mapping) else {}
-    known = _known_unknowns(system, sensors)
+    known = {"clock": (1.0, ""), "phase": (0.0, "periods")}  # first guess and unit of all that may be found
+    known |= {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
+    for q, unit in {**system.states, **system.outputs}.items():
+        if q in sensors:
+            inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
+            for what, of in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
+                known[f"{q}.{what}"] = (getattr(sensors[q], what), of)
     allowed = {name: unit for name, (_, unit) in known.items()}
     if not given:
         raise ValueError(f"parameters names nothing to be found; allowed: {', '.join(allowed)}")
@@ -101,12 +102,9 @@ def read_unknowns(
         raise ValueError(f"the phase of {system.name!r} cannot be found: {why}; leave 'phase' out")
     active = tuple(name for name in given if name in system.values)
     of_sensors = tuple((q, what) for name in given if "." in name for q, what in [name.split(".", 1)])
-    own = list(per_run)
-    for name in own:
-        if name not in given:
-            raise ValueError(f"per_run: {unknown(name, 'an unknown', 'this fit', dict.fromkeys(given, ''))}")
+    check_keys(per_run, given, "per_run", "an unknown", "this fit")
     phases = (len(runs) - steady) * phase
-    each = {*own, *["phase"] * phase} if len(runs) > 1 else set()
+    each = {*per_run, *["phase"] * phase} if len(runs) > 1 else set()
     local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * phase]
     rows = [
         (n, run) for n in local for run in (runs[: phases if phase and n == "phase" else None] if n in each else [""])
@@ -123,10 +121,14 @@ def read_unknowns(
     for i, name in enumerate(names):
         if clock and base[i] == "clock":
             low[i], high[i] = _CLOCKS
-        pair = bounds.get(base[i])
-        if pair is not None:
-            low[i], high[i] = _bounds(name, pair, guess[i])
-    centre, precision = _known(tuple(names), priors, guess)
+        if (pair := bounds.get(base[i])) is not None:
+            low[i], high[i] = ends(pair, name)
+            if not low[i] <= guess[i] <= high[i]:
+                raise ValueError(
+                    f"the first guess {name} = {guess[i]:g} lies outside its bounds {low[i]:g} ... {high[i]:g}; set "
+                    f"another with system.with_parameters({name}=...)"
+                )
+    centre, precision = _known(names, priors, guess)
     return Unknowns(
         tuple(names),
         active,
@@ -143,28 +145,7 @@ def read_unknowns(
     )
 
 
-def _known_unknowns(system: System, sensors: Mapping[str, Sensor]) -> dict[str, tuple[float, str]]:
-    """First guess and unit of everything that may be found."""
-    found = {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
-    for q, unit in {**system.states, **system.outputs}.items():
-        if q in sensors:
-            inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
-            for what, own in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
-                found[f"{q}.{what}"] = (getattr(sensors[q], what), own)
-    return {"clock": (1.0, ""), "phase": (0.0, "periods"), **found}
-
-
-def _bounds(name: str, pair: Any, guess: float) -> tuple[float, float]:
-    low, high = ends(pair, name)
-    if not low <= guess <= high:
-        raise ValueError(
-            f"the first guess {name} = {guess:g} lies outside its bounds {low:g} ... {high:g}; set another with "
-            f"system.with_parameters({name}=...)"
-        )
-    return low, high
-
-
-def _known(names: tuple[str, ...], priors: Any, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _known(names: list[str], priors: Any, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Centre and precision of what is known before: ``{name: (value, standard uncertainty)}``, or a ParameterSet."""
     p = len(names)
     centre, precision = guess.copy(), np.zeros((p, p))
@@ -182,9 +163,8 @@ def _known(names: tuple[str, ...], priors: Any, guess: FloatArray) -> tuple[Floa
         raise TypeError(
             f"priors = {shortened(priors)}: allowed are {{name: (value, standard uncertainty)}} and a ParameterSet"
         )
+    check_keys(priors, names, "priors", "an unknown", "this fit")
     for name, pair in priors.items():
-        if name not in names:
-            raise ValueError(f"priors: {unknown(name, 'an unknown', 'this fit', list(names))}")
         if not isinstance(pair, list | tuple) or len(pair) != 2:
             raise TypeError(f"priors[{name!r}] = {shortened(pair)}: allowed is (value, standard uncertainty)")
         value, error = (real_number(number, f"priors[{name!r}]") for number in pair)

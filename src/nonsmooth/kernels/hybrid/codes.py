@@ -20,6 +20,7 @@ BEYOND_STOP = -2  # the start satisfies the condition of a transition with a res
 
 # Places in ``work.tally``: counts
 BEGUN, MODE, JUMPS, BURST = 0, 1, 2, 3  # transitions within one return, period or unit; and closely behind each other
+GOES_ON = 2  # of BEGUN: behind an earlier run; what holds at that very instant is still to be taken
 RETURNS, PASSES, TRIES = 4, 5, 6  # of the section; steps since the last pass
 SAMPLES, CROSSINGS, TOUCHES = 7, 8, 9  # logged
 FIRED = 10  # the functional (indicator) that has crossed, or -1

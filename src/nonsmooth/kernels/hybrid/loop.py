@@ -27,6 +27,7 @@ from nonsmooth.kernels.hybrid.codes import (
     DIVERGED,
     FIRED,
     FIRST,
+    GOES_ON,
     JUMPS,
     MODE,
     MOST_AT_ONCE,
@@ -139,7 +140,9 @@ def begin(i, form, net, section, motion, tables, work):
             tally[BEGUN], tally[STARTS], tally[WAITS] = 0, 1, net.together[tally[MODE]] + 1
             return PAUSED
         look(i, form, tables, work, tally[MODE])
-        if motion.counters[1] != 1:
+        if motion.counters[1] == 1:
+            tally[BEGUN] = GOES_ON
+        else:
             code = settle(i, form, net, tables, work)
             tally[TAKEN] = 0
         if code == PAUSED:  # it begins anew when the mode stands
@@ -243,9 +246,14 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
         if t >= 0:
             tally[WAITS] = 0
             short, state = tally[CLOSELY] != 0, tally[NOTED]
-        elif changed(goal, seen, work):
-            look(i, form, tables, work, tally[MODE])
+        elif tally[BEGUN] == GOES_ON or changed(goal, seen, work):
+            goes_on = tally[BEGUN] == GOES_ON  # an earlier run ended here before what happens at this very instant
+            tally[BEGUN] = 1
+            if not goes_on:  # else ``begin`` has looked
+                look(i, form, tables, work, tally[MODE])
             t = next_holding(tally[MODE], tables, net, work)
+            if goes_on and (t < 0 or lies_beyond(t, form, net, work)):
+                continue
             tally[FIRED], tally[SOURCE], tally[NOTED] = -1, tally[MODE], OPEN_RUN
             short, state = False, OPEN_RUN
         else:

@@ -39,11 +39,8 @@ def read(data: bytes, reading: Reading) -> None:
     containers = list(_containers("", variables, 0))
     holds = _is_vector if reading.rate is None else _is_series
     vectors = [(path, node) for path, node in containers if any(map(_is_series if node.rate else holds, node.values()))]
-    found: list[tuple[str, Group, str | None]] = []
-    for path, node in vectors:
-        key = _axis_of(node, reading.axis)
-        if key is not None or reading.rate or node.rate:
-            found.append((path, node, key))
+    keys = [(path, node, _axis_of(node, reading.axis)) for path, node in vectors]
+    found = [(path, node, key) for path, node, key in keys if key is not None or reading.rate or node.rate]
     if not found:
         names = [f"{path}.{key}".lstrip(".") for path, node in vectors for key, v in node.items() if _is_vector(v)]
         raise reading.error(
@@ -82,29 +79,29 @@ def _axis_of(node: Mapping[str, Any], axis: str) -> str | None:
     names = [name for name, value in node.items() if _is_vector(value)]
     keys = [name for name in names if name.casefold() == axis]
     keys = keys or [name for name in names if is_axis_name(label(name)[0], axis)]
-    return keys[0] if keys and sum(_is_array(v) and v.size > 1 for v in node.values()) > 1 else None
+    return keys[0] if keys and sum(map(_is_array, node.values())) > 1 else None
 
 
 def _is_array(value: Any) -> bool:
-    return isinstance(value, np.ndarray)
+    return isinstance(value, np.ndarray) and value.size > 1
 
 
 def _is_vector(value: Any) -> bool:
-    return _is_array(value) and value.size > 1 and max(value.shape) == value.size
+    return _is_array(value) and max(value.shape) == value.size
 
 
 def _is_series(value: Any) -> bool:
-    return _is_array(value) and value.size > 1 and value.ndim < 3
+    return _is_array(value) and value.ndim < 3
 
 
 def _note(value: Any) -> str:
     if isinstance(value, str):
         return value[:1000]
-    return str(value.ravel()[0]) if _is_array(value) and value.size == 1 else ""
+    return str(value.ravel()[0]) if isinstance(value, np.ndarray) and value.size == 1 else ""
 
 
 def _table(run: str, path: str, node: Group, key: str | None, reading: Reading) -> FieldTable:
-    arrays = {name: value for name, value in node.items() if _is_array(value) and value.size > 1}
+    arrays = {name: value for name, value in node.items() if _is_array(value)}
     units = _units(node, list(arrays), reading, run)
     lengths = [v.size for v in arrays.values() if _is_vector(v)] or [max(v.shape) for v in arrays.values()]
     n = max(set(lengths), key=lengths.count) if key is None else arrays[key].size
@@ -130,10 +127,8 @@ def _table(run: str, path: str, node: Group, key: str | None, reading: Reading) 
 def _columns(value: NDArray[Any], n: int) -> list[NDArray[Any]] | None:
     if value.size == n and max(value.shape) == n:
         return [value.ravel()]
-    if value.ndim == 2 and value.shape[0] == n:
-        return list(value.T)
-    if value.ndim == 2 and value.shape[1] == n:
-        return list(value)
+    if value.ndim == 2 and n in value.shape:
+        return list(value.T if value.shape[0] == n else value)
     return None
 
 
@@ -156,7 +151,7 @@ def _chosen(variables: Mapping[str, Any], reading: Reading) -> FieldTable:
         (f"{path}.{name}".lstrip("."), value, node.units.get(name, ""), node.rate)
         for path, node in _containers("", variables, 0)
         for name, value in node.items()
-        if _is_array(value) and value.size > 1
+        if _is_array(value)
     ]
     arrays = {path: value for path, value, _, _ in found}
     units = {path: unit for path, _, unit, _ in found}

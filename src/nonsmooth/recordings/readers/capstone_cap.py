@@ -12,7 +12,7 @@ entity) is refused.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers import expat
@@ -45,28 +45,15 @@ def read(data: bytes, reading: Reading) -> None:
     for run, name in experiment.empty:
         reading.of(f"Run #{run}", name, "has no stored values (it may be calculated); left out")
     comma = experiment.header.get("DecimalSeparator", ".") == ","
-    traces = []
-    for group in _groups(experiment, reading):
-        trace = _trace(group, archive, comma, experiment.units, reading)
-        if trace is not None:
-            traces.append(trace)
-    order = sorted(dict.fromkeys(trace.run for trace in traces), key=lambda run: int(run.removeprefix("Run #")))
-    reading.traces = [trace for run in order for trace in traces if trace.run == run]
-
-
-def _groups(experiment: Experiment, reading: Reading) -> Iterator[list[Segment]]:
-    """The blocks of one measurement in one run, together."""
-    groups: dict[int, list[Segment]] = {}
+    groups: dict[int, list[Segment]] = {}  # the blocks of one measurement in one run, together
     for segment in experiment.segments:
         if segment.deleted:
-            reading.of(_run(segment), segment.measurement, "deleted by the user in Capstone; left out")
-            continue
-        groups.setdefault(segment.data_set, []).append(segment)
-    return iter(groups.values())
-
-
-def _run(segment: Segment) -> str:
-    return f"Run #{segment.run}"
+            reading.of(f"Run #{segment.run}", segment.measurement, "deleted by the user in Capstone; left out")
+        else:
+            groups.setdefault(segment.data_set, []).append(segment)
+    traces = [_trace(group, archive, comma, experiment.units, reading) for group in groups.values()]
+    found = [trace for trace in traces if trace is not None]
+    reading.traces = sorted(found, key=lambda trace: int(trace.run.removeprefix("Run #")))
 
 
 def _trace(
@@ -76,17 +63,17 @@ def _trace(
     place = f"main.xml, line {first.line}"
     if not (first.run.isascii() and first.run.isdigit() and len(first.run) < 10):
         raise reading.error(place, f"DataGroupNumber is {first.run[:40]!r}, expected the number of a run")
-    run, name = _run(first), first.measurement
+    run, name = f"Run #{first.run}", first.measurement
     times, values = [], []
     for segment in group:
-        stretch = _stretch(segment, archive, comma, reading)
-        if stretch is None:
+        found = _stretch(segment, archive, comma, reading)
+        if found is None:
             reading.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
             continue
-        times.append(stretch[0])
-        values.append(stretch[1])
-        if stretch[2]:
-            reading.of(run, name, f"{stretch[2]} records between valid ones are marked invalid; they are NaN")
+        times.append(found[0])
+        values.append(found[1])
+        if blank := len(found[1]) - int(segment.size):
+            reading.of(run, name, f"{blank} records between valid ones are marked invalid; they are NaN")
     if not values:
         return None
     # As in the CSV export, so that a channel has one name in both.
@@ -103,10 +90,8 @@ def _trace(
     return Trace(run, name, unit, np.concatenate(times), np.concatenate(values), origin, attrs=attrs)
 
 
-def _stretch(
-    segment: Segment, archive: Archive, comma: bool, reading: Reading
-) -> tuple[FloatArray, FloatArray, int] | None:
-    """Times and values of a block, and how many of its records are blank; None if it holds typed text."""
+def _stretch(segment: Segment, archive: Archive, comma: bool, reading: Reading) -> tuple[FloatArray, FloatArray] | None:
+    """Times and values of a block; None if it holds typed text."""
     place = f"main.xml, line {segment.line}"
     if not (segment.size.isascii() and segment.size.isdigit() and len(segment.size) < 16):
         raise reading.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
@@ -115,12 +100,12 @@ def _stretch(
     if values is None:
         return None
     if size == 0:
-        return values, values, 0
+        return values, values
     if segment.times:
         times = _records(segment.times, size, archive, reading)
         if times is None or len(times) != len(values):
             raise reading.error(segment.times, f"does not hold one time for each of the {len(values)} values")
-        return times, values, len(values) - size
+        return times, values
     start, interval = (
         number(text.replace(",", ".") if comma else text, ".") for text in (segment.start, segment.interval)
     )
@@ -130,7 +115,7 @@ def _stretch(
             f"the clock of {segment.values} is IntervalCacheStartValue = {segment.start[:40]!r}, "
             f"IntervalCacheInterval = {segment.interval[:40]!r}; expected a time and a step > 0",
         )
-    return start + interval * np.arange(len(values), dtype=np.float64), values, len(values) - size
+    return start + interval * np.arange(len(values), dtype=np.float64), values
 
 
 def _records(member: str, size: int, archive: Archive, reading: Reading) -> FloatArray | None:
@@ -138,21 +123,18 @@ def _records(member: str, size: int, archive: Archive, reading: Reading) -> Floa
     content = b"".join(archive.pieces(member))
     count, rest = divmod(len(content), RECORD.itemsize)
     table = np.frombuffer(content, RECORD, count)
-    valid, marked = table["valid"], np.flatnonzero(table["valid"])
-
-    def error(record: int, message: str) -> DataFileError:
-        return reading.error(f"{member}, record {record}", message)
-
+    valid, marked, odd = table["valid"], np.flatnonzero(table["valid"]), np.flatnonzero(table["valid"] > 1)
     if count and valid[0] == _TYPED_TEXT:
         return None
-    if len(odd := np.flatnonzero(valid > 1)):
-        raise error(int(odd[0]) + 1, f"its valid flag is {valid[odd[0]]}, expected 0 or 1")
+    if len(odd):
+        raise reading.error(f"{member}, record {odd[0] + 1}", f"its valid flag is {valid[odd[0]]}, expected 0 or 1")
+    place = f"{member}, record {count}"
     if len(marked) > size:
-        raise error(count, f"has more valid records than the {size} of main.xml")
+        raise reading.error(place, f"has more valid records than the {size} of main.xml")
     if rest:
-        raise error(count + 1, f"is cut short: {rest} of {RECORD.itemsize} bytes")
+        raise reading.error(f"{member}, record {count + 1}", f"is cut short: {rest} of {RECORD.itemsize} bytes")
     if len(marked) < size:
-        raise error(count, f"{len(marked)} of {count} records are valid, main.xml announces {size}")
+        raise reading.error(place, f"{len(marked)} of {count} records are valid, main.xml announces {size}")
     end = int(marked[-1]) + 1 if size else 0
     return np.where(valid[:end] == 1, table["value"][:end], math.nan)
 
@@ -192,103 +174,84 @@ class Experiment:
 
 def parse(pieces: Iterable[bytes], reading: Reading) -> Experiment:
     """Read the pieces of ``main.xml``; DataFileError with its line for anything that is not as it should be."""
-    handler = _Handler(reading)
-    parser = handler.parser
+    parser, found = expat.ParserCreate(), Experiment()
+    nested: list[str] = []
+    sources: list[dict[str, str]] = []
+    run: dict[str, str] | None = None
+    segment: Segment | None = None
+    runs = 0
+
+    def error(message: str) -> DataFileError:
+        return reading.error(f"main.xml, line {parser.CurrentLineNumber}", message)
+
+    def refuse(*_: Any) -> None:
+        raise error("declares a document type or entities, which no Capstone file does; refused")
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal run, segment, runs
+        if not nested and name != "DSProExperiment":
+            raise error(f"the root is {name[:60]!r}, expected DSProExperiment")
+        nested.append(name)
+        if len(nested) > _MAX_NESTING:
+            raise error(f"elements are nested deeper than {_MAX_NESTING}")
+        if name == "Header":
+            found.header.update({key: attributes[key] for key in list(attributes)[:64]})
+        elif name == "Sensor" and len(found.sensors) < MAX_COLUMNS:
+            kept = ("Name", "DistanceForFullRotation", "SamplePeriod")
+            found.sensors.append({key: attributes[key] for key in kept if key in attributes})
+        elif name == "DataSource":
+            sources.append(attributes)
+        elif "Unit" in name and len(found.units) < MAX_COLUMNS:  # a number, and the symbol or name that it stands for
+            code = next((value for key, value in attributes.items() if key.endswith("ID") and value.isdigit()), None)
+            text = next((attributes[key] for key in _UNIT_WORDS if attributes.get(key)), None)
+            if code is not None and text is not None:
+                found.units.setdefault(code, text)
+        elif name == "DataSet" and sources:
+            run = attributes
+            runs += 1
+        elif name == "DataSegmentElement" and run is not None:
+            segment = Segment(
+                measurement=sources[-1].get("MeasurementName", ""),
+                channel=sources[-1].get("ChannelIDName", ""),
+                unit=sources[-1].get("BaseUnit", ""),
+                run=run.get("DataGroupNumber", ""),
+                data_set=runs,
+                line=parser.CurrentLineNumber,
+                deleted=run.get("DataHasBeenDeleted", "").upper() == "TRUE",
+            )
+        elif segment is not None and name == "DependentStorageElement":
+            segment.values = _path(attributes.get("FileName", ""))
+            segment.size = attributes.get("DataCacheDataSize", "")
+        elif segment is not None and name == "IndependentStorageElement":
+            segment.times = _path(attributes.get("FileName", ""))
+            segment.start = attributes.get("IntervalCacheStartValue", "")
+            segment.interval = attributes.get("IntervalCacheInterval", "")
+
+    def end(name: str) -> None:
+        nonlocal run, segment
+        nested.pop()
+        if name == "DataSegmentElement" and segment is not None:
+            if len(found.segments) >= 4 * MAX_COLUMNS:
+                raise error(f"holds more than {4 * MAX_COLUMNS} blocks of data")
+            if segment.values:
+                found.segments.append(segment)
+            elif len(found.empty) < MAX_COLUMNS:
+                found.empty.append((segment.run, segment.measurement))
+            segment = None
+        elif name == "DataSet":
+            run = None
+        elif name == "DataSource" and sources:
+            sources.pop()
+
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    parser.StartElementHandler, parser.EndElementHandler = start, end
     try:
         for piece in pieces:
             parser.Parse(piece, False)
         parser.Parse(b"", True)
-    except expat.ExpatError as error:
-        raise reading.error(f"main.xml, line {error.lineno}", f"is not well-formed XML ({error})") from None
-    if not handler.rooted:
-        raise reading.error("main.xml", "holds no element; expected the root DSProExperiment")
-    return handler.found
-
-
-class _Handler:
-    def __init__(self, reading: Reading) -> None:
-        self.found = Experiment()
-        self.rooted = False
-        self.parser = expat.ParserCreate()
-        self._reading = reading
-        self._open: list[str] = []
-        self._data_sources: list[dict[str, Any]] = []
-        self._data_set: dict[str, str] | None = None
-        self._data_sets = 0
-        self._segment: Segment | None = None
-        self.parser.StartDoctypeDeclHandler = self._refuse
-        self.parser.EntityDeclHandler = self._refuse
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-
-    def _error(self, message: str) -> DataFileError:
-        return self._reading.error(f"main.xml, line {self.parser.CurrentLineNumber}", message)
-
-    def _refuse(self, *_: Any) -> None:
-        raise self._error("declares a document type or entities, which no Capstone file does; refused")
-
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        if not self.rooted:
-            if name != "DSProExperiment":
-                raise self._error(f"the root is {name[:60]!r}, expected DSProExperiment")
-            self.rooted = True
-        self._open.append(name)
-        if len(self._open) > _MAX_NESTING:
-            raise self._error(f"elements are nested deeper than {_MAX_NESTING}")
-        if name == "Header":
-            self.found.header.update({key: attributes[key] for key in list(attributes)[:64]})
-        elif name == "Sensor" and len(self.found.sensors) < MAX_COLUMNS:
-            kept = ("Name", "DistanceForFullRotation", "SamplePeriod")
-            self.found.sensors.append({key: attributes[key] for key in kept if key in attributes})
-        elif name == "DataSource":
-            self._data_sources.append(attributes)
-        elif "Unit" in name and len(self.found.units) < MAX_COLUMNS:
-            self._unit(attributes)
-        elif name == "DataSet" and self._data_sources:
-            self._data_set = attributes
-            self._data_sets += 1
-        elif name == "DataSegmentElement" and self._data_set is not None:
-            self._begin(self._data_sources[-1], self._data_set)
-        elif self._segment is not None and name == "DependentStorageElement":
-            self._segment.values = _path(attributes.get("FileName", ""))
-            self._segment.size = attributes.get("DataCacheDataSize", "")
-        elif self._segment is not None and name == "IndependentStorageElement":
-            self._segment.times = _path(attributes.get("FileName", ""))
-            self._segment.start = attributes.get("IntervalCacheStartValue", "")
-            self._segment.interval = attributes.get("IntervalCacheInterval", "")
-
-    def _unit(self, attributes: dict[str, str]) -> None:
-        """A row of a table of units: a number, and the symbol or name that it stands for."""
-        code = next((value for key, value in attributes.items() if key.endswith("ID") and value.isdigit()), None)
-        text = next((attributes[key] for key in _UNIT_WORDS if attributes.get(key)), None)
-        if code is not None and text is not None:
-            self.found.units.setdefault(code, text)
-
-    def _begin(self, data_source: dict[str, Any], data_set: dict[str, str]) -> None:
-        self._segment = Segment(
-            measurement=data_source.get("MeasurementName", ""),
-            channel=data_source.get("ChannelIDName", ""),
-            unit=data_source.get("BaseUnit", ""),
-            run=data_set.get("DataGroupNumber", ""),
-            data_set=self._data_sets,
-            line=self.parser.CurrentLineNumber,
-            deleted=data_set.get("DataHasBeenDeleted", "").upper() == "TRUE",
-        )
-
-    def _end(self, name: str) -> None:
-        self._open.pop()
-        if name == "DataSegmentElement" and self._segment is not None:
-            if len(self.found.segments) >= 4 * MAX_COLUMNS:
-                raise self._error(f"holds more than {4 * MAX_COLUMNS} blocks of data")
-            if self._segment.values:
-                self.found.segments.append(self._segment)
-            elif len(self.found.empty) < MAX_COLUMNS:
-                self.found.empty.append((self._segment.run, self._segment.measurement))
-            self._segment = None
-        elif name == "DataSet":
-            self._data_set = None
-        elif name == "DataSource" and self._data_sources:
-            self._data_sources.pop()
+    except expat.ExpatError as why:
+        raise reading.error(f"main.xml, line {why.lineno}", f"is not well-formed XML ({why})") from None
+    return found
 
 
 def _path(text: str) -> str:

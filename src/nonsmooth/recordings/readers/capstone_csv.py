@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.fields import Field, FieldTable, split_unit, traces_of
-from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows, sniffed
+from nonsmooth.recordings.readers.text_table import Numerals, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Reading, names_of
 
 #: What ``write_capstone_csv`` puts behind a run's name: the only free text of the format.
@@ -49,7 +49,7 @@ def read(data: bytes, reading: Reading) -> None:
     if reading.columns is not None or reading.rate is not None or reading.axis != "time":
         raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
     delimiter = reading.delimiter or _delimiter(data, reading)
-    numerals = Numerals(reading.decimal or ("." if delimiter == "," else None), reading.thousands, reading.na or ())
+    numerals = Numerals.of(delimiter, reading)
     table = rows(decoded(data, reading), delimiter, reading)
     line, fields = next(table, (1, []))
     header = checked_header(fields, line, reading)
@@ -59,12 +59,16 @@ def read(data: bytes, reading: Reading) -> None:
     for column, (run, label) in channels.items():
         own = [k for k, (r, _) in times.items() if r == run]
         time_at = max((k for k in own if k < column), default=own[0])  # the one before this column, else the first
-        tables.setdefault(time_at, []).append(_field(column, label, cells))
+        name, unit = split_unit(label)
+        match = _PORT.fullmatch(name)
+        attrs = {"measurement": match["measurement"], "port": match["port"]} if match else {"measurement": name}
+        held = Field(name, unit, cells.values[column], f"column {column + 1}", cells.rows[column], attrs)
+        tables.setdefault(time_at, []).append(held)
     for column, (run, unit) in times.items():
         if column in tables:
             time = Field("time", unit, cells.values[column], f"column {column + 1}", cells.rows[column])
-            held = FieldTable(run, [time, *tables[column]], len(cells.lines), cells.lines)
-            reading.traces += traces_of(held, reading)
+            whole = FieldTable(run, [time, *tables[column]], len(cells.lines), cells.lines)
+            reading.traces += traces_of(whole, reading)
         else:
             reading.of(run, header[column], "is the time of no channel")
     runs = {run for run, _ in times.values()}
@@ -103,13 +107,6 @@ def _layout(header: list[str], reading: Reading) -> tuple[dict[int, tuple[str, s
     if not channels:
         raise reading.error("line 1", "holds time columns only; expected channels such as 'Position (m) Run #1'")
     return times, channels
-
-
-def _field(column: int, label: str, cells: Cells) -> Field:
-    name, unit = split_unit(label)
-    match = _PORT.fullmatch(name)
-    attrs = {"measurement": match["measurement"], "port": match["port"]} if match else {"measurement": name}
-    return Field(name, unit, cells.values[column], f"column {column + 1}", cells.rows[column], attrs)
 
 
 def _delimiter(data: bytes, reading: Reading) -> str:

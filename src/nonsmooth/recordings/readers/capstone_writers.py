@@ -130,7 +130,18 @@ def write_cap(recording: Recording, path: str | os.PathLike[str], *, sensors: Se
                     f"          <IndependentStorageElement {independent}/>\n"
                     "        </DataSegmentElement>\n      </DataSet>\n"
                 )
-    xml = _document(sources, sensors)
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>\n<DSProExperiment>\n',
+        '  <Header Version="1" DecimalSeparator="." '
+        f'Origin="{capstone_cap.SYNTHETIC}: computed by nonsmooth, not measured"/>\n',
+        *(f"  <Sensor {_attributes(sensor)}/>\n" for sensor in sensors),
+        "  <DataRepository>\n",
+    ]
+    for (measurement, port, unit), sets in sources.items():
+        named = {"MeasurementName": measurement, "ChannelIDName": port, "BaseUnit": unit}
+        shown = _attributes({key: value for key, value in named.items() if value})
+        lines += [f"    <DataSource {shown}>\n", *sets, "    </DataSource>\n"]
+    xml = "".join([*lines, "  </DataRepository>\n</DSProExperiment>\n"])
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         # A fixed date: equal recordings give equal files.
@@ -141,20 +152,8 @@ def write_cap(recording: Recording, path: str | os.PathLike[str], *, sensors: Se
     return _put(Path(path), packed.getvalue())
 
 
-def _document(sources: Mapping[tuple[str, str, str], list[str]], sensors: Sequence[Mapping[str, str]]) -> str:
-    lines = [
-        '<?xml version="1.0" encoding="utf-8"?>\n<DSProExperiment>\n',
-        '  <Header Version="1" DecimalSeparator="." '
-        f'Origin="{capstone_cap.SYNTHETIC}: computed by nonsmooth, not measured"/>\n',
-    ]
-    for sensor in sensors:
-        lines.append(f"  <Sensor {' '.join(f'{key}={quoteattr(str(value))}' for key, value in sensor.items())}/>\n")
-    lines.append("  <DataRepository>\n")
-    for (measurement, port, unit), sets in sources.items():
-        named = {"MeasurementName": measurement, "ChannelIDName": port, "BaseUnit": unit}
-        shown = " ".join(f"{key}={quoteattr(value)}" for key, value in named.items() if value)
-        lines += [f"    <DataSource {shown}>\n", *sets, "    </DataSource>\n"]
-    return "".join([*lines, "  </DataRepository>\n</DSProExperiment>\n"])
+def _attributes(given: Mapping[str, str]) -> str:
+    return " ".join(f"{key}={quoteattr(str(value))}" for key, value in given.items())
 
 
 def _sensors(recording: Recording, run: str) -> Iterator[xr.Dataset]:

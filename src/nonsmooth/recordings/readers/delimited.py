@@ -77,13 +77,11 @@ def _kept(stream: Iterable[str], reading: Reading, top: list[str], comments: lis
 
 
 def _table(table: Iterator[Row], run: str, delimiter: str, reading: Reading, ends: bool) -> Iterator[Trace]:
-    decimal = reading.decimal or ("." if delimiter == "," else None)
-    numerals = Numerals(decimal, reading.thousands, reading.na or ())
+    numerals = Numerals.of(delimiter, reading)
     line, fields = next(table)
     header, table = _header(checked_header(fields, line, reading), table, line, numerals, reading)
     if reading.units_row:
-        units, table = _units(table, reading.units_row, reading)
-        units += [""] * (len(header) - len(units))
+        units = _units(table, reading.units_row, reading) + [""] * len(header)
         header = [f"{name} ({unit})" if unit else name for name, unit in zip(header, units, strict=False)]
     picked = chosen(header, reading)
     if reading.columns is not None and set(picked) <= {"time", "run"}:
@@ -97,9 +95,8 @@ def _table(table: Iterator[Row], run: str, delimiter: str, reading: Reading, end
     left = [text for k, text in enumerate(header) if k not in wanted and text.strip()]
     if left:
         reading.say(f"columns not asked for are left out: {names_of(left)}")
-    place = {column: k for k, column in enumerate(wanted)}
     found = [
-        Field(name, unit, cells.values[place[c]], f"column {c + 1} ({header[c]})", cells.rows[place[c]])
+        Field(name, unit, cells.values[c], f"column {c + 1} ({header[c]})", cells.rows[c])
         for name, (c, unit) in picked.items()
     ]
     reading.told.update(delimiter=delimiter, columns=len(header), rows=len(cells.lines))
@@ -126,13 +123,11 @@ def _header(
     return [f"column {k + 1}" for k in range(len(top))], itertools.chain([(line, top)], table)
 
 
-def _units(table: Iterator[Row], at: int, reading: Reading) -> tuple[list[str], Iterator[Row]]:
-    """The row of units, without brackets, and the rows below it."""
-    for line, fields in table:
-        if line >= at:
-            if line == at:
-                return [text.strip().strip("[]()").strip() for text in fields], table
-            break
+def _units(table: Iterator[Row], at: int, reading: Reading) -> list[str]:
+    """The row of units, without brackets; those above it are passed over."""
+    line, fields = next((row for row in table if row[0] >= at), (0, []))
+    if line == at:
+        return [text.strip().strip("[]()").strip() for text in fields]
     raise reading.error(f"line {at}", "is no row of units below the header, as units_row says")
 
 

@@ -45,16 +45,12 @@ class FieldTable(NamedTuple):
 
 def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
     """``"Force (push) (N/(m/s))"`` -> ``("Force (push)", "N/(m/s)")``: the last balanced bracket is the unit."""
-    stripped = text.strip()
-    opening, closing = brackets[0], brackets[1]
-    if not stripped.endswith(closing):
-        return stripped, ""
-    depth = 0
+    stripped, depth = text.strip(), 0
     for i in range(len(stripped) - 1, -1, -1):
-        depth += (stripped[i] == closing) - (stripped[i] == opening)
-        if depth == 0:
-            name = stripped[:i].strip()
-            return (name, stripped[i + 1 : -1].strip()) if name else (stripped, "")
+        depth += (stripped[i] == brackets[1]) - (stripped[i] == brackets[0])
+        if depth <= 0:  # where the last bracket opens, or at once where the text ends in none
+            name, unit = stripped[:i].strip(), stripped[i + 1 : -1].strip()
+            return (name, unit) if name and i + 1 < len(stripped) else (stripped, "")
     return stripped, ""
 
 
@@ -220,11 +216,10 @@ def seconds_of(axis: Field, lines: IntArray | None, reading: Reading) -> tuple[F
     import pandas
 
     if axis.values.dtype.kind in "mM":
-        dates = axis.values.astype("datetime64[ns]" if axis.values.dtype.kind == "M" else "timedelta64[ns]")
+        is_date = axis.values.dtype.kind == "M"
+        dates = axis.values.astype("datetime64[ns]" if is_date else "timedelta64[ns]")
         nanoseconds = dates.astype(np.int64)
-        return np.asarray((nanoseconds - nanoseconds[:1]) * 1e-9), str(
-            dates[0]
-        ) if axis.values.dtype.kind == "M" and len(dates) else ""
+        return np.asarray((nanoseconds - nanoseconds[:1]) * 1e-9), str(dates[0]) if is_date and len(dates) else ""
     texts = [str(text).strip() for text in axis.values]
     given = axis.unit if "%" in axis.unit else None
     if given is None and texts and _CLOCK.fullmatch(texts[0]):

@@ -30,10 +30,6 @@ def _matlab(data: bytes, reading: Reading) -> Loaded:
     return variables, {"version": "7.3" if is_hdf5 else "5", "text": text.decode("ascii", "replace")}
 
 
-def _hdf5(data: bytes, reading: Reading) -> Loaded:
-    return load_hdf5(data, reading, matlab=False), {}
-
-
 def _numpy(data: bytes, reading: Reading) -> Loaded:
     if not data.startswith(b"PK"):
         return Group({"values": _array(data, "values", reading)}), {}
@@ -46,7 +42,7 @@ def _array(data: bytes, name: str, reading: Reading) -> Any:
     """The array of one .npy file; a structured one as a group of its fields."""
     stream = io.BytesIO(data)
     form = np.lib.format
-    with readable("a .npy array", reading, name):
+    with readable("read as a .npy array", reading, name):
         version = form.read_magic(stream)
         shape, _, kind = (form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0)(stream)
         if kind.hasobject or math.prod(shape) * kind.itemsize > len(data):
@@ -150,14 +146,14 @@ def _measured(data: bytes, reading: Reading) -> Loaded:
 def load(data: bytes, reading: Reading) -> Loaded:
     """The arrays of a file."""
     loader, what = _LOADERS[reading.format]
-    with readable(what, reading):
+    with readable(f"read as {what}", reading):
         return loader(data, reading)
 
 
 #: What loads each format of arrays, and its name in messages.
 _LOADERS: dict[str, tuple[Callable[[bytes, Reading], Loaded], str]] = {
     "mat": (_matlab, "a MATLAB file"),
-    "hdf5": (_hdf5, "HDF5"),
+    "hdf5": (lambda data, reading: (load_hdf5(data, reading, matlab=False), {}), "HDF5"),
     "tdms": (load_tdms, "TDMS"),
     "npy": (_numpy, "NumPy's arrays"),
     "arrow": (_arrow, "Parquet or Arrow"),

@@ -12,31 +12,20 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.readers.fields import Field, FieldTable, traces_of
-from nonsmooth.recordings.readers.text_table import Cells, Numerals, decoded, number, read_cells
+from nonsmooth.recordings.readers.text_table import Cells, Numerals, Row, decoded, number, read_cells
 from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Trace
 
 _END = "***End_of_Header***"
 _MAX_SEGMENTS = 1024
 _MAX_COMMENTS = 64  # kept per segment
 
-Lines = Iterator[tuple[int, list[str]]]
-
-
-@dataclass
-class _Segment:
-    """A segment's header, the names of its channels, its columns as read, and the comments behind its rows."""
-
-    line: int
-    names: list[str]
-    fields: dict[str, list[str]]
-    cells: Cells
-    comments: list[str]
+Header = dict[str, list[str]]
 
 
 def read(data: bytes, reading: Reading) -> None:
@@ -46,25 +35,47 @@ def read(data: bytes, reading: Reading) -> None:
     separator, lines = _lines(data, reading)
     header = _keys(lines, reading, "the file's header")
     reading.told = {key: " ".join(values) for key, values in header.items() if key}
-    decimal = _word(header, "Decimal_Separator", ".") or "."
-    if decimal not in ".," or len(decimal) != 1 or decimal == separator:
+    decimal = _word(header, "Decimal_Separator", ".")
+    if decimal not in (".", ",") or decimal == separator:
         raise reading.error("", f"Decimal_Separator is {decimal[:20]!r}, expected '.' or ','")
     clocks = _word(header, "X_Columns", "One")
     if clocks not in ("One", "No", "Multi"):
         raise reading.error("", f"X_Columns is {clocks[:20]!r}, expected One, No or Multi")
-    ends, numerals = data.endswith(b"\n"), Numerals(decimal, reading.thousands, reading.na or ())
-    for k, segment in enumerate(_segments(lines, clocks, numerals, reading, ends), 1):
-        run = f"Segment {k}"
-        if segment.comments:
-            more = len(segment.comments) - _MAX_COMMENTS
-            said = segment.comments[:_MAX_COMMENTS] + ([f"(and {more} more)"] if more > 0 else [])
+    numerals = Numerals(decimal, reading.thousands, reading.na or ())
+    rows, count, channels = _Rows(lines, decimal), 0, 0
+    for line, _ in rows.to_header(1):
+        raise reading.error(f"line {line}", "holds values before any segment's header")
+    while rows.following is not None:
+        line, first = rows.following
+        place, count = f"line {line}", count + 1
+        if count > _MAX_SEGMENTS:
+            raise reading.error(place, f"holds more than {_MAX_SEGMENTS} segments")
+        header = _keys(lines, reading, f"the segment's header that begins in {place}", first)
+        names = _names(header, lines, line, clocks, reading)
+        channels += len(names)
+        if channels > MAX_COLUMNS:
+            raise reading.error(
+                place, f"its {count} segments hold {channels} channels so far; at most {MAX_COLUMNS} are read"
+            )
+        pairs = [text for name in names for text in (f"X_Value of {name}", name)]
+        labels = pairs if clocks == "Multi" else ["X_Value", *names]
+        wanted = range(clocks == "No", len(labels))
+        table = rows.to_header(len(labels))
+        cells = read_cells(table, labels, wanted, numerals, replace(reading), ends_with_newline=True)
+        cut = rows.following is None and not data.endswith(b"\n") and rows.last < len(labels)
+        if cut and len(cells.lines):
+            raise reading.error(f"line {cells.lines[-1]}", "ends in the middle of a row: the file is cut short")
+        run = f"Segment {count}"
+        if rows.comments:
+            more = len(rows.comments) - _MAX_COMMENTS
+            said = rows.comments[:_MAX_COMMENTS] + ([f"(and {more} more)"] if more > 0 else [])
             reading.run_attrs[run] = {"comments": "\n".join(said)}
-        reading.traces += _traces(run, segment, clocks, decimal, reading)
+        reading.traces += _traces(run, line, header, names, cells, clocks, decimal, reading)
     if not reading.traces:
         raise reading.error("", f"holds no segment of data after its header; expected one that ends in {_END}")
 
 
-def _lines(data: bytes, reading: Reading) -> tuple[str, Lines]:
+def _lines(data: bytes, reading: Reading) -> tuple[str, Iterator[Row]]:
     """The separator, and the lines split by it, with their numbers."""
     stream = decoded(data, reading)
     top: list[str] = []
@@ -78,21 +89,19 @@ def _lines(data: bytes, reading: Reading) -> tuple[str, Lines]:
     if not top or not top[0].lstrip().startswith("LabVIEW Measurement"):
         raise reading.error("line 1", "expected 'LabVIEW Measurement'")
 
-    def split() -> Lines:
+    def split() -> Iterator[Row]:
         special = False
-        for number_, text in enumerate(itertools.chain(top, stream), 1):
+        for line, text in enumerate(itertools.chain(top, stream), 1):
             # Blocks of other programs' data; their own business.
-            if text.startswith("***Start_Special***"):
-                special = True
+            special = special or text.startswith("***Start_Special***")
             if not special:
-                yield number_, text.rstrip("\r\n").split(separator)
-            if text.startswith("***End_Special***"):
-                special = False
+                yield line, text.rstrip("\r\n").split(separator)
+            special = special and not text.startswith("***End_Special***")
 
     return separator, split()
 
 
-def _keys(lines: Lines, reading: Reading, what: str, first: list[str] | None = None) -> dict[str, list[str]]:
+def _keys(lines: Iterator[Row], reading: Reading, what: str, first: list[str] | None = None) -> Header:
     """Key and values of each line up to the end of a header."""
     found = {first[0].strip(): first[1:]} if first else {}
     for _, fields in lines:
@@ -100,106 +109,78 @@ def _keys(lines: Lines, reading: Reading, what: str, first: list[str] | None = N
             return found
         if len(found) > 256:
             break
-        if fields[0].strip():
-            found[fields[0].strip()] = fields[1:]
+        if key := fields[0].strip():
+            found[key] = fields[1:]
     raise reading.error("", f"{what} has no end; expected {_END}")
 
 
-def _word(header: dict[str, list[str]], key: str, default: str) -> str:
-    values = header.get(key) or [default]
-    return values[0].strip() if len(values[0].strip()) else values[0][:1] or default
-
-
-def _segments(lines: Lines, clocks: str, numerals: Numerals, reading: Reading, ends: bool) -> Iterator[_Segment]:
-    """Each segment: its header, the names of its columns, and the rows up to the next header."""
-    count, channels, decimal = 0, 0, numerals.decimal or "."
-    begun = next(((line, fields) for line, fields in lines if any(f.strip() for f in fields)), None)
-    while begun is not None:
-        line, fields = begun
-        if not _is_key(fields[0], decimal):
-            raise reading.error(f"line {line}", "holds values before any segment's header")
-        count += 1
-        if count > _MAX_SEGMENTS:
-            raise reading.error(f"line {line}", f"holds more than {_MAX_SEGMENTS} segments")
-        header, names = _begin(line, fields, lines, clocks, reading)
-        channels += len(names)
-        if channels > MAX_COLUMNS:
-            raise reading.error(
-                f"line {line}", f"its {count} segments hold {channels} channels so far; at most {MAX_COLUMNS} are read"
-            )
-        labels = (
-            [text for name in names for text in (f"X_Value of {name}", name)]
-            if clocks == "Multi"
-            else (["X_Value", *names])
-        )
-        rows = _Rows(lines, len(labels), decimal)
-        wanted = range(clocks == "No", len(labels))
-        cells = read_cells(iter(rows), labels, wanted, numerals, replace(reading), ends_with_newline=True)
-        if not ends and rows.following is None and len(cells.lines) and rows.last < len(labels):
-            raise reading.error(f"line {cells.lines[-1]}", "ends in the middle of a row: the file is cut short")
-        yield _Segment(line, names, header, cells, rows.comments)
-        begun = rows.following
+def _word(header: Header, key: str, default: str) -> str:
+    value = (header.get(key) or [""])[0]
+    return value.strip() or value[:1] or default
 
 
 class _Rows:
-    """Rows of a segment without their comments, up to the header that follows."""
+    """Rows of a file without their comments, from one header to the next."""
 
-    def __init__(self, lines: Lines, width: int, decimal: str) -> None:
-        self.lines, self.width, self.decimal = lines, width, decimal
+    def __init__(self, lines: Iterator[Row], decimal: str) -> None:
+        self.lines, self.decimal = lines, decimal
         self.comments: list[str] = []
-        self.following: tuple[int, list[str]] | None = None
+        self.following: Row | None = None
         self.last = 0
 
-    def __iter__(self) -> Iterator[tuple[int, list[str]]]:
+    def to_header(self, width: int) -> Iterator[Row]:
+        """The rows up to the header that follows, without what stands behind ``width`` fields."""
+        self.comments, self.following, self.last = [], None, 0
         for line, fields in self.lines:
-            if not any(f.strip() for f in fields):
-                continue
-            if _is_key(fields[0], self.decimal):
+            key = fields[0].strip()
+            if (key[:1].isalpha() or key.startswith("*")) and number(key, self.decimal) is None:
                 self.following = line, fields
                 return
-            said = " ".join(text.strip() for text in fields[self.width :] if text.strip())
-            self.comments += [f"line {line}: {said[:400]}"] if said else []
-            self.last = len(fields)
-            yield line, fields[: self.width]
+            if any(map(str.strip, fields)):
+                said = " ".join(text.strip() for text in fields[width:] if text.strip())
+                self.comments += [f"line {line}: {said[:400]}"] if said else []
+                self.last = len(fields)
+                yield line, fields[:width]
 
 
-def _is_key(text: str, decimal: str) -> bool:
-    key = text.strip()
-    return bool(key) and (key[0].isalpha() or key.startswith("*")) and number(key, decimal) is None
-
-
-def _begin(
-    line: int, fields: list[str], lines: Lines, clocks: str, reading: Reading
-) -> tuple[dict[str, list[str]], list[str]]:
-    """The header of a segment, and the names of its channels."""
-    header = _keys(lines, reading, f"the segment's header that begins in line {line}", fields)
+def _names(header: Header, lines: Iterator[Row], line: int, clocks: str, reading: Reading) -> list[str]:
+    """The names of a segment's channels."""
     said = _word(header, "Channels", "")
     if not (said.isascii() and said.isdigit()) or not 0 < int(said[:9]) <= MAX_COLUMNS:
         raise reading.error(f"line {line}", f"Channels is {said[:20]!r}, expected a number from 1 to {MAX_COLUMNS}")
     n = int(said)
-    at, top = next(lines, (line, []))
-    if not top or top[0].strip() != "X_Value":
+    at, top = next(lines, (line, [""]))
+    if top[0].strip() != "X_Value":
         raise reading.error(f"line {at}", "expected the names of the columns, beginning with X_Value")
     names = top[1:] if clocks != "Multi" else top[1::2]
     if len(names) < n:
         raise reading.error(f"line {at}", f"names {len(names)} columns, the segment has {n} channels")
-    return header, [name.strip() for name in names[:n]]
+    return [name.strip() for name in names[:n]]
 
 
-def _traces(run: str, segment: _Segment, clocks: str, decimal: str, reading: Reading) -> Iterator[Trace]:
-    at = f"line {segment.line}"
-    n, cells = len(segment.names), segment.cells
-    start, step, said = (
-        _numbers(segment, key, default, decimal, at, reading)
-        for key, default in (("X0", 0.0), ("Delta_X", math.nan), ("Samples", math.nan))
-    )
-    units, dates, times = (_texts(segment, key, n) for key in ("Y_Unit_Label", "Date", "Time"))
-    dimension = (_texts(segment, "X_Dimension", n)[0] or "Time").strip()
+def _traces(
+    run: str, line: int, header: Header, names: list[str], cells: Cells, clocks: str, decimal: str, reading: Reading
+) -> Iterator[Trace]:
+    at = f"line {line}"
+
+    def texts(key: str) -> list[str]:
+        return ([text.strip() for text in header.get(key, [])] + [""] * len(names))[: len(names)]
+
+    def numbers(key: str, default: float) -> FloatArray:
+        found = [number(text, decimal) if text else default for text in texts(key)]
+        for k, (text, value) in enumerate(zip(texts(key), found, strict=True), 1):
+            if text and (value is None or not math.isfinite(value)):
+                raise reading.error(at, f"{key} of channel {k} is {text[:40]!r}, expected a number")
+        return np.array(found, float)
+
+    start, step, said = numbers("X0", 0.0), numbers("Delta_X", math.nan), numbers("Samples", math.nan)
+    units, dates, times = map(texts, ("Y_Unit_Label", "Date", "Time"))
+    dimension = texts("X_Dimension")[0] or "Time"
     if dimension.casefold() != reading.axis.casefold():
         raise reading.error(at, f"its channels are over {dimension!r}; read it with axis={dimension.lower()!r}")
-    unit = "s" if reading.axis == "time" else _texts(segment, "X_Unit_Label", n)[0]
-    for k, name in enumerate(segment.names):
-        column = 2 * k + 1 if clocks == "Multi" else k + (clocks != "No")
+    unit = "s" if reading.axis == "time" else texts("X_Unit_Label")[0]
+    for k, name in enumerate(names):
+        column = 2 * k + 1 if clocks == "Multi" else k + 1
         rows, values = cells.rows[column], cells.values[column]
         if clocks == "Multi":
             axis, held = cells.values[column - 1], cells.rows[column - 1]
@@ -213,24 +194,9 @@ def _traces(run: str, segment: _Segment, clocks: str, decimal: str, reading: Rea
             reading.of(run, name, f"Samples says {said[k]:g} (its first write), {len(values)} were read")
         elif said[k] > len(values):
             reading.of(run, name, f"Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short")
-        if k and start[k] != start[0]:
+        if start[k] != start[0]:
             reading.of(run, name, f"its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}")
-        begun, origin = f"{dates[k]} {times[k]}".strip(), f"column {k + 2} from line {segment.line} on"
+        begun, origin = f"{dates[k]} {times[k]}".strip(), f"column {k + 2} from line {line} on"
         clock = Field(reading.axis, unit, axis, f"X_Value of {name}", held)
         channel = Field(name, units[k], values, origin, rows, {"started": begun} if begun else {})
         yield from traces_of(FieldTable(run, [clock, channel], len(cells.lines), cells.lines), reading)
-
-
-def _texts(segment: _Segment, key: str, n: int) -> list[str]:
-    return ([text.strip() for text in segment.fields.get(key, [])] + [""] * n)[:n]
-
-
-def _numbers(segment: _Segment, key: str, default: float, decimal: str, place: str, reading: Reading) -> FloatArray:
-    found = np.full(len(segment.names), default)
-    for k, text in enumerate(_texts(segment, key, len(segment.names))):
-        if text:
-            value = number(text, decimal)
-            if value is None or not math.isfinite(value):
-                raise reading.error(place, f"{key} of channel {k + 1} is {text[:40]!r}, expected a number")
-            found[k] = value
-    return found

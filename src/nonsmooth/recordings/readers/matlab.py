@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Reading, inflation_limit
+from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Reading, inflation_limit, readable
 
 _HEADER = 128
 _INT8, _INT32, _MATRIX, _COMPRESSED = 1, 5, 14, 15
@@ -41,7 +41,13 @@ def load_v5(data: bytes, reading: Reading) -> dict[str, Any]:
     for kind, body, position in _elements(memoryview(data), order, "variable at ", reading, _HEADER):
         place = f"variable at byte {position}"
         if kind == _COMPRESSED:
-            unpacked = _unpacked(body, left, place, reading)
+            unpacker = zlib.decompressobj()
+            with readable("unpacked", reading, place):
+                unpacked = unpacker.decompress(body, left + 1)
+            if len(unpacked) > left:
+                raise reading.error(place, f"unpacks to more than {left} bytes, more than the file's size warrants")
+            if not unpacker.eof:
+                raise reading.error(place, "cannot be unpacked, it is cut short")
             left -= len(unpacked)
             kind, body, _ = next(_elements(memoryview(unpacked), order, f"{place}, ", reading), (0, body, 0))
         if kind != _MATRIX:
@@ -55,20 +61,6 @@ def load_v5(data: bytes, reading: Reading) -> dict[str, Any]:
             plain += struct.pack(order + "II", _MATRIX, len(body)) + body
     found = loadmat(io.BytesIO(bytes(plain)), struct_as_record=True, squeeze_me=False, mat_dtype=False)
     return {name: _plain(value) for name, value in found.items() if not name.startswith("__")}
-
-
-def _unpacked(packed: memoryview, limit: int, place: str, reading: Reading) -> bytes:
-    """The bytes of a packed variable, at most ``limit``."""
-    unpacker = zlib.decompressobj()
-    try:
-        found = unpacker.decompress(packed, limit + 1)
-    except zlib.error as error:
-        raise reading.error(place, f"cannot be unpacked, it is damaged ({error})") from None
-    if len(found) > limit:
-        raise reading.error(place, f"unpacks to more than {limit} bytes, more than the file's size warrants")
-    if not unpacker.eof:
-        raise reading.error(place, "cannot be unpacked, it is cut short")
-    return found
 
 
 def _elements(
@@ -148,87 +140,80 @@ def load_hdf5(data: bytes, reading: Reading, *, matlab: bool) -> dict[str, Any]:
     """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
     import h5py
 
-    with h5py.File(io.BytesIO(data), "r") as opened:
-        return _GroupReader(h5py, opened, reading, inflation_limit(len(data)), matlab).group(opened, 0)
+    left, members = inflation_limit(len(data)), 16 * MAX_COLUMNS  # of what a file may hold
 
-
-class _GroupReader:
-    """An open file, of whose groups so much is read as its limits allow."""
-
-    def __init__(self, h5py: Any, opened: Any, reading: Reading, limit: int, matlab: bool) -> None:
-        self._h5py, self._file, self._reading, self._matlab = h5py, opened, reading, matlab
-        self._left = self._limit = limit
-        self._members = 16 * MAX_COLUMNS
-
-    def group(self, group: Any, depth: int) -> dict[str, Any]:
+    def of_group(group: Any, depth: int) -> dict[str, Any]:
         if depth > MAX_DEPTH:
-            raise self._reading.error(str(group.name), f"is nested deeper than {MAX_DEPTH}")
-        found = {} if self._matlab else Group(rate=_rate(group))
+            raise reading.error(str(group.name), f"is nested deeper than {MAX_DEPTH}")
+        found = {} if matlab else Group(rate=_rate(group))
         for name in group:
             place = f"{group.name.rstrip('/')}/{name}"
             # What MATLAB keeps for itself is reached by references only.
             if name.startswith("#"):
                 continue
-            if not isinstance(group.get(name, getlink=True), self._h5py.HardLink):
-                self._reading.say(f"{place}: is a link; left out")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                reading.say(f"{place}: is a link; left out")
                 continue
-            found[name] = self._value(group[name], place, depth)
+            found[name] = value_of(group[name], place, depth)
             if isinstance(found, Group):
-                units = group[name].attrs.get("units", group[name].attrs.get("unit", ""))
-                found.units[name] = units.decode("utf-8", "replace") if isinstance(units, bytes) else str(units)
+                attrs = group[name].attrs
+                found.units[name] = _word(attrs.get("units", attrs.get("unit", "")))
                 found.rate = found.rate or _rate(group[name])
         return found
 
-    def _value(self, item: Any, place: str, depth: int) -> Any:
-        self._members -= 1
-        if self._members < 0:
-            raise self._reading.error(place, f"the file holds more than {16 * MAX_COLUMNS} arrays")
-        if isinstance(item, self._h5py.Group):
-            return _rows(self.group(item, depth + 1))
-        if not isinstance(item, self._h5py.Dataset):
-            self._reading.say(f"{place}: is neither a group nor an array; left out")
+    def value_of(item: Any, place: str, depth: int) -> Any:
+        nonlocal left, members
+        members -= 1
+        if members < 0:
+            raise reading.error(place, f"the file holds more than {16 * MAX_COLUMNS} arrays")
+        if isinstance(item, h5py.Group):
+            return _rows(of_group(item, depth + 1))
+        if not isinstance(item, h5py.Dataset):
+            reading.say(f"{place}: is neither a group nor an array; left out")
             return None
-        return self._array(item, place, depth)
-
-    def _array(self, item: Any, place: str, depth: int) -> Any:
-        kind = item.attrs.get("MATLAB_class", b"")
-        kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+        kind = _word(item.attrs.get("MATLAB_class", b""))
         if "MATLAB_empty" in item.attrs:
             return "" if kind == "char" else np.empty(0)
         if item.is_virtual or item.external:
-            self._reading.say(f"{place}: its values are in other files; left out")
+            reading.say(f"{place}: its values are in other files; left out")
             return None
-        refers = self._h5py.check_ref_dtype(item.dtype) is not None
-        compound = item.dtype.names is not None
-        if not refers and not compound and item.dtype.kind not in "fiub":
-            self._reading.say(f"{place}: holds {item.dtype} values, no numbers; left out")
+        refers, names = h5py.check_ref_dtype(item.dtype) is not None, item.dtype.names
+        if not refers and names is None and item.dtype.kind not in "fiub":
+            reading.say(f"{place}: holds {item.dtype} values, no numbers; left out")
             return None
         if item.shape is None:
             return np.empty(0)
-        self._left -= item.size * max(1, item.dtype.itemsize)
-        if self._left < 0 or item.size > max(4096, 1100 * item.id.get_storage_size()):
-            raise self._reading.error(
-                place, f"says it holds {item.shape} values, more than a file of {self._reading.size} bytes warrants"
+        left -= item.size * max(1, item.dtype.itemsize)
+        if left < 0 or item.size > max(4096, 1100 * item.id.get_storage_size()):
+            raise reading.error(
+                place, f"says it holds {item.shape} values, more than a file of {reading.size} bytes warrants"
             )
         values = np.asarray(item[()])
         if refers:
-            members = [
-                self._value(self._file[ref], f"{place}({k})", depth + 1) if ref else None
+            held = [
+                value_of(opened[ref], f"{place}({k})", depth + 1) if ref else None
                 for k, ref in enumerate(values.ravel(), 1)
             ]
             if depth > MAX_DEPTH:
-                raise self._reading.error(place, f"is nested deeper than {MAX_DEPTH}")
-            return members if kind == "cell" else _Column(members)
-        if compound and not self._matlab:
-            return Group({name: values[name] for name in values.dtype.names or ()}, rate=_rate(item))
-        if compound:
-            if values.dtype.names != ("real", "imag"):
-                self._reading.say(f"{place}: holds compound values; left out")
+                raise reading.error(place, f"is nested deeper than {MAX_DEPTH}")
+            return held if kind == "cell" else _Column(held)
+        if names is not None and not matlab:
+            return Group({name: values[name] for name in names}, rate=_rate(item))
+        if names is not None:
+            if names != ("real", "imag"):
+                reading.say(f"{place}: holds compound values; left out")
                 return None
             values = values["real"] + 1j * values["imag"]
         if kind == "char":
             return values.T.ravel(order="F").astype("<u2").tobytes().decode("utf-16-le", errors="replace")
-        return values.T if self._matlab else values  # MATLAB's order
+        return values.T if matlab else values  # MATLAB's order
+
+    with h5py.File(io.BytesIO(data), "r") as opened:
+        return of_group(opened, 0)
+
+
+def _word(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def _rate(item: Any) -> float | None:

@@ -21,7 +21,7 @@ def read(data: bytes, reading: Reading) -> None:
         for piece in archive.pieces(name):
             if name.endswith((".xml", ".rels")) and b"<!DOCTYPE" in piece:
                 raise reading.error(name, "has a document type, which is refused")
-    with readable("a workbook", reading), warnings.catch_warnings():
+    with readable("read as a workbook", reading), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
         sheets = [(sheet.title, list(_lines(sheet))) for sheet in book.worksheets]

@@ -42,15 +42,12 @@ def _heard(reading: Reading) -> Iterator[None]:
         reading.say(f"npTDMS: {record.getMessage()[:200]}")
         return False
 
-    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "nptdms"]
-    loggers = [logging.getLogger(name) for name in names]
-    for logger in loggers:
-        logger.addFilter(note)
-    try:
+    with contextlib.ExitStack() as stack:
+        for name in list(logging.root.manager.loggerDict):
+            if name.split(".")[0] == "nptdms":
+                logging.getLogger(name).addFilter(note)
+                stack.callback(logging.getLogger(name).removeFilter, note)
         yield
-    finally:
-        for logger in loggers:
-            logger.removeFilter(note)
 
 
 def _by_clock(group: Any, data: bytes, reading: Reading) -> list[Group]:
@@ -64,11 +61,8 @@ def _by_clock(group: Any, data: bytes, reading: Reading) -> list[Group]:
         values, properties = np.asarray(channel[:]), _plain(channel.properties)
         step, begin = (_number(properties.get(key)) for key in ("wf_increment", "wf_start_offset"))
         clock = (step, begin or 0.0, n) if step is not None and step > 0 else None
-        if (
-            values.ndim != 1
-            or values.dtype.kind not in "fiubM"
-            or (values.dtype.kind == "M" and (clock or not is_axis_name(channel.name, "time")))
-        ):
+        kinds = "fiub" if clock or not is_axis_name(channel.name, "time") else "fiubM"
+        if values.ndim != 1 or values.dtype.kind not in kinds:
             reading.of(group.name, channel.name, f"holds {values.dtype.name} values, no real numbers; left out")
             continue
         held = groups.setdefault(clock, Group())
@@ -109,8 +103,7 @@ def check_layout(data: bytes, reading: Reading) -> None:
         if contents & (1 << 6):
             raise reading.error(place, "is written in big-endian order, which is not read; save it again on a PC")
         left = len(data) - position - _LEAD_IN
-        if end == _UNFINISHED:
-            end = left
+        end = left if end == _UNFINISHED else end
         if end > left or raw > end:
             raise reading.error(
                 place, f"says it is {end} bytes long with data from {raw} on, but {left} bytes follow: it is cut short"

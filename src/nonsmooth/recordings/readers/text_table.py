@@ -29,13 +29,9 @@ _SNIFFED = 20  # rows looked at to tell the decimal mark
 
 def decoded(data: bytes, reading: Reading) -> io.TextIOWrapper:
     """The text of a file: UTF-8 or UTF-16 with or without mark, else Windows-1252 (with a remark)."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        encoding = "utf-16"
-    else:
-        encoding = "utf-8-sig"
-        nul = data.find(b"\0")
-        if nul >= 0:
-            raise reading.error(f"line {_line_of(data, nul)}", "holds a zero byte; this is not a text table")
+    encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
+    if encoding != "utf-16" and (nul := data.find(b"\0")) >= 0:
+        raise reading.error(f"line {_line_of(data, nul)}", "holds a zero byte; this is not a text table")
     try:
         data.decode(encoding)
     except UnicodeDecodeError as error:
@@ -60,10 +56,7 @@ def sniffed(line: str) -> str:
 def rows(lines: Iterable[str], delimiter: str, reading: Reading, first_line: int = 1) -> Iterator[Row]:
     """Line number and fields of each row that is not empty. A delimiter of " " stands for any white space."""
     if delimiter == " ":
-        for line, text in enumerate(lines, first_line):
-            fields = text.split()
-            if fields:
-                yield line, fields
+        yield from ((line, text.split()) for line, text in enumerate(lines, first_line) if text.strip())
         return
     reader = csv.reader(lines, delimiter=delimiter, strict=True)
     while True:
@@ -112,6 +105,11 @@ class Numerals(NamedTuple):
     thousands: str | None = None
     na: Sequence[str] = ()
 
+    @classmethod
+    def of(cls, delimiter: str, reading: Reading) -> Numerals:
+        """As they are asked for; a comma that separates fields is no decimal mark."""
+        return cls(reading.decimal or ("." if delimiter == "," else None), reading.thousands, reading.na or ())
+
     def some(self, field: str) -> bool:
         """Return whether it is a number, or the mark of a missing one."""
         text = field.strip()
@@ -119,10 +117,10 @@ class Numerals(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """The columns of a table: values, and the rows (from 0) in which each has one; the line of every row."""
+    """Columns of a table by place: values, and the rows (from 0) in which each has one; the line of every row."""
 
-    values: list[NDArray[Any]]
-    rows: list[IntArray]
+    values: dict[int, NDArray[Any]]
+    rows: dict[int, IntArray]
     lines: IntArray
 
 
@@ -143,35 +141,38 @@ def read_cells(
     """
     n = len(labels)
     head = [row for _, row in zip(range(_SNIFFED), table, strict=False)]
-    decimal, thousands, na = numerals.decimal or _decimal_of(head, wanted), numerals.thousands, numerals.na
+    decimal, thousands, na = numerals
+    if decimal is None:  # a comma, if there are fields that are numbers with one and none that are with a point
+        fields = [row[k] for _, row in head for k in wanted if k < len(row)]
+        commas, points = (any(mark in f and number(f, mark) is not None for f in fields) for mark in ",.")
+        decimal = "," if commas and not points else "."
     begins = next((row[stamped] for _, row in head if len(row) > stamped >= 0 and row[stamped].strip()), "0")
     stamps: list[str] | None = None if number(begins, decimal, thousands) is not None else []
-    values = [array("d") for _ in wanted]
-    held = [array("q") for _ in wanted]
-    lines = array("q")
-    pairs = sorted(enumerate(wanted), key=lambda pair: pair[1])
+    values = {column: array("d") for column in wanted}
+    held = {column: array("q") for column in wanted}
+    lines, ordered = array("q"), sorted(wanted)
     short, first_short, last_short = 0, 0, False
     table = itertools.chain(head, table)
     while chunk := list(itertools.islice(table, _CHUNK)):
-        begin, slow = len(lines), pairs
+        begin, slow = len(lines), ordered
         lines.extend(line for line, _ in chunk)
         if all(len(fields) == n for _, fields in chunk):
             last_short, slow = False, []
-            for k, column in pairs:
+            for column in ordered:
                 texts = [] if stamps is not None and column == stamped else [fields[column] for _, fields in chunk]
                 plain = _plain(texts, decimal)
                 if plain is None:
-                    slow.append((k, column))
+                    slow.append(column)
                 else:
-                    values[k].extend(plain)
-                    held[k].extend(range(begin, begin + len(chunk)))
+                    values[column].extend(plain)
+                    held[column].extend(range(begin, begin + len(chunk)))
         for row, (line, fields) in enumerate(chunk, begin) if slow else ():
             if len(fields) > n and any(field.strip() for field in fields[n:]):
                 raise reading.error(f"line {line}", f"has {len(fields)} fields, the header has {n}")
             last_short = len(fields) < n
             if last_short:
                 short, first_short = short + 1, first_short or line
-            for k, column in slow:
+            for column in slow:
                 # A short row costs what it weighs, however many columns the header announces.
                 if column >= len(fields):
                     break
@@ -184,17 +185,16 @@ def read_cells(
                     value = number(field, decimal, thousands)
                     if value is None:
                         raise reading.error(f"line {line}", _no_number(column, fields, labels, decimal, line, row == 0))
-                    values[k].append(value)
-                held[k].append(row)
+                    values[column].append(value)
+                held[column].append(row)
     if last_short and not ends_with_newline:
         raise reading.error(f"line {lines[-1]}", f"ends after fewer than {n} fields: the file is cut short")
     if short:
         reading.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
-    columns = [
-        np.array(stamps, object) if stamps is not None and column == stamped else np.asarray(v)
-        for column, v in zip(wanted, values, strict=True)
-    ]
-    return Cells(columns, [np.asarray(h) for h in held], np.asarray(lines))
+    columns = {column: np.asarray(found) for column, found in values.items()}
+    if stamps is not None:
+        columns[stamped] = np.array(stamps, object)
+    return Cells(columns, {column: np.asarray(rows) for column, rows in held.items()}, np.asarray(lines))
 
 
 def _plain(texts: list[str], decimal: str) -> list[float] | None:
@@ -226,14 +226,6 @@ def _no_number(column: int, fields: list[str], labels: Sequence[str], decimal: s
         options = f"if it marks a missing value, na={shown.strip()!r}"
     said = f"column {column + 1} ({labels[column]!r}) holds {shown!r}, expected a number with the decimal mark"
     return f"{said} {decimal!r}, or nothing; {options}"
-
-
-def _decimal_of(head: list[Row], wanted: Sequence[int]) -> str:
-    """A comma, if there are fields that are numbers with one and none that are numbers with a point."""
-    fields = [row[k] for _, row in head for k in wanted if k < len(row)]
-    commas = any("," in f and number(f, ",") is not None for f in fields)
-    points = any("." in f and number(f, ".") is not None for f in fields)
-    return "," if commas and not points else "."
 
 
 def _line_of(data: bytes, position: int) -> int:

@@ -38,22 +38,11 @@ def warn(x: Any, sentence: str) -> None:
 def signal(
     time: ArrayLike, x: Any, *, least: int, purpose: str, missing: str = "error"
 ) -> tuple[FloatArray, FloatArray]:
-    """Times and values as arrays, checked.
+    """Times (s) and values as arrays of one length, increasing and finite; ValueError that says what to do where they
+    are not.
 
-    Parameters
-    ----------
-    time, x : array_like, shape (N,)
-        Seconds, increasing, and the values; a DataArray says whose they are in the messages.
-    least : int
-        The fewest samples that ``purpose`` needs.
-    missing : {"error", "keep"}
-        What values that are not finite lead to: an error, or a warning and their place kept.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ, a time is not finite or does not increase, values are missing (with
-        ``missing="error"``), or there are too few of them.
+    ``purpose`` needs at least so many samples. With ``missing="keep"`` values that are not finite keep their place,
+    with a warning.
     """
     name = whose(x)
     t, values = np.asarray(time, float), np.array(x, float)
@@ -87,32 +76,29 @@ def signal(
 
 
 def even_rate(time: FloatArray, x: Any, purpose: str) -> float:
-    """The one sample rate of a signal in Hz.
-
-    Raises
-    ------
-    ValueError
-        If the rate changes, samples are missing, or the steps are uneven.
+    """The one sample rate of a signal in Hz; ValueError where it changes, samples are missing, or the steps are
+    uneven.
     """
     clock = examine(time)
+    if clock.regular:
+        return clock.rate
+    why = (
+        f"the samples are not evenly spaced; {purpose} needs an even rate: take smooth(), which does without, or "
+        "interpolate its result"
+    )
     if clock.change is not None:
         i, before, after = clock.change
-        raise ValueError(
-            f"{whose(x)}: the sample rate changes from {before:.6g} Hz to {after:.6g} Hz near t = {time[i]:.9g} s; "
+        why = (
+            f"the sample rate changes from {before:.6g} Hz to {after:.6g} Hz near t = {time[i]:.9g} s; "
             f"{purpose} needs one rate: split the record there"
         )
-    if clock.gaps:
+    elif clock.gaps:
         i, count = clock.gaps[0]
-        raise ValueError(
-            f"{whose(x)}: {count} samples are missing after t = {time[i]:.9g} s; {purpose} needs an even rate: "
+        why = (
+            f"{count} samples are missing after t = {time[i]:.9g} s; {purpose} needs an even rate: "
             "cut the record there, or take smooth(), which does without"
         )
-    if not clock.regular:
-        raise ValueError(
-            f"{whose(x)}: the samples are not evenly spaced; {purpose} needs an even rate: take smooth(), which "
-            "does without, or interpolate its result"
-        )
-    return clock.rate
+    raise ValueError(f"{whose(x)}: {why}")
 
 
 def take(
@@ -160,15 +146,13 @@ def take(
     if array.size < samples:
         raise ValueError(f"{name}: {array.size} samples are too short to identify anything from; {samples} are needed")
     (axis,) = array.dims
-    total, start, longest = missing_runs(np.asarray(array.values, float))
+    along, (total, start, longest) = array[axis].values, missing_runs(np.asarray(array.values, float))
     if total and missing == "error":
         raise ValueError(
             f"{name}: {total} of {array.size} values are not finite numbers, the longest run of them {longest} from "
-            f"{axis} = {float(array[axis][start]):.9g} on; cut the record there, leave this run out (of the notebook, "
-            "where there is one), or take(..., missing='keep') and smooth it, which bridges them"
+            f"{axis} = {along[start]:.9g} on; cut the record there, leave this run out (of the notebook, where there "
+            "is one), or take(..., missing='keep') and smooth it, which bridges them"
         )
-    if duration is not None:
-        length = float(array[axis][-1] - array[axis][0])
-        if length < duration:
-            raise ValueError(f"{name}: lasts {length:.4g} s, needed are {duration:.4g} s: record longer")
+    if duration is not None and (length := along[-1] - along[0]) < duration:
+        raise ValueError(f"{name}: lasts {length:.4g} s, needed are {duration:.4g} s: record longer")
     return array

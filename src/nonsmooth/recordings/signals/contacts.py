@@ -81,10 +81,7 @@ def impacts(
         weak = np.flatnonzero(size < significance)
         drop = set(weak[np.argsort(size[weak])][: max(1, len(weak) // 2)].tolist())
         taken = [kink for k, kink in enumerate(taken) if k not in drop]
-    names = ["impact_time", "impact_x", "impact_x_error"] + [
-        f"v_{side}{error}" for side in ("before", "after") for error in ("", "_error")
-    ]
-    kept = result[names]
+    kept = result.drop_dims("time")
     kept["impact_time_error"] = ("impact", np.array([error for _, error in taken]), {"units": "s"})
     kept["significance"] = ("impact", size, {"long_name": "jump of the velocity in its standard errors"})
     kept.attrs = {"signal": whose(x, ""), "sample_error": result.attrs["sample_error"]}
@@ -307,9 +304,8 @@ def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float
         begin, end, cut = np.zeros(0), np.zeros(0), np.zeros(0, np.bool_)
     else:
         begin, end, cut = intervals(found, gap)
-    speed = [np.interp(at, t, found["v"].values) for at in (begin, end)]
-    own = [np.interp(at, t, found["x_error"].values) for at in (begin, end)]
-    errors = [np.hypot(e, gap_error) / np.maximum(np.abs(v), 1e-300) for e, v in zip(own, speed, strict=True)]
+    speed, own = (np.interp([begin, end], t, found[name].values) for name in ("v", "x_error"))
+    errors = np.hypot(own, gap_error) / np.maximum(np.abs(speed), 1e-300)
     depth, seen = np.zeros(len(begin)), np.zeros(len(begin), np.int64)
     for k, (b, e) in enumerate(zip(begin, end, strict=True)):
         here = (t >= b) & (t <= e)

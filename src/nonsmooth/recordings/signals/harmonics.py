@@ -122,42 +122,27 @@ def fit(
             f"{whose(x)}: harmonic {n} lies at {n * base / (2 * math.pi):.4g} Hz, above half the sample rate of "
             f"{rate:.4g} Hz; fit fewer"
         )
-    centre = 0.5 * (t[0] + t[-1])
-    tau = t - centre
-    if refine:
-        base = _best(tau, values, base, n, length)
-    A, solution, left = _fitted(tau, values, base, n)
+    if refine:  # about the record's middle, where frequency and phase are independent
+        base = _best(t - 0.5 * (t[0] + t[-1]), values, base, n, length)
+    A, solution, left = _fitted(t, values, base, n)
     cos, sin = solution[1::2], solution[2::2]
     names = ["mean"] + [f"{f}_{j}" for j in range(1, n + 1) for f in ("cos", "sin")]
     if refine:
-        A = np.column_stack([A, _slope(tau, A, solution) / subharmonic])
+        A = np.column_stack([A, _slope(t, A, solution) / subharmonic])
         names.append("omega")
     variance = (left @ left) / max(len(t) - A.shape[1], 1)
     correlation = correlation_times(left)
     inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
     C = variance * correlation * inverse @ inverse.T
-    # From the record's middle, where frequency and phase are independent, to t = 0.
-    angle = np.arange(1, n + 1) * base * centre
-    turn = np.eye(len(C))
-    for k, a in enumerate(angle):
-        c, s = math.cos(a), math.sin(a)
-        turn[1 + 2 * k : 3 + 2 * k, 1 + 2 * k : 3 + 2 * k] = [[c, -s], [s, c]]
-        if refine:
-            rate_of = (k + 1) * centre / subharmonic
-            u, w = c * cos[k] - s * sin[k], s * cos[k] + c * sin[k]
-            turn[1 + 2 * k, -1], turn[2 + 2 * k, -1] = -rate_of * w, rate_of * u
-    phases = np.mod(np.arctan2(sin, cos) + angle, 2 * math.pi)
-    C = turn @ C @ turn.T
     covariance = xr.DataArray(
         C, {"parameter": names, "parameter_2": names}, ("parameter", "parameter_2"), name="covariance"
     )
-    error = math.sqrt(C[-1, -1]) if refine else 0.0
     return HarmonicFit(
         base * subharmonic,
-        error,
+        math.sqrt(C[-1, -1]) if refine else 0.0,
         float(solution[0]),
         np.hypot(cos, sin),
-        phases,
+        np.mod(np.arctan2(sin, cos), 2 * math.pi),
         covariance,
         math.sqrt(variance),
         correlation,

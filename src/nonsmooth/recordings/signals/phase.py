@@ -168,28 +168,24 @@ def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> 
     steps = np.diff(times)
     typical = float(np.median(steps))
     counts = np.maximum(np.rint(steps / typical), 1).astype(np.int64)
-    if (steps < 0.6 * typical).any():
-        i = int(np.argmax(steps < 0.6 * typical))
+    if len(short := np.flatnonzero(steps < 0.6 * typical)):
+        i = short[0]
         raise ValueError(
             f"{whose(time)}: two turns only {steps[i]:.4g} s apart at t = {times[i]:.6g} s, where a turn takes "
             f"{typical:.4g} s; if the motor's speed was changed there, split the record, else remove the false one"
         )
-    if (counts > 1).any():
-        i = int(np.argmax(counts > 1))
-        warn(
-            time,
-            f"the gate missed {int((counts - 1).sum())} turns, the first after t = {times[i]:.6g} s; they are counted",
-        )
+    if len(missed := np.flatnonzero(counts > 1)):
+        first = times[missed[0]]
+        warn(time, f"the gate missed {(counts - 1).sum()} turns, the first after t = {first:.6g} s; they are counted")
     turns = np.concatenate([[0], np.cumsum(counts)])
     line, covariance = np.polyfit(turns, times, 1, cov="unscaled")
     residual = times - np.polyval(line, turns)
     scatter = float(np.sqrt(residual @ residual / (len(times) - 2)))
     s = max(scatter, resolution / math.sqrt(12.0))
     period, (period_error, t_0_error) = float(line[0]), (s * np.sqrt(np.diag(covariance))).tolist()
-    omega = TURN / period
     return DrivePhase(
-        omega,
-        omega * period_error / period,
+        TURN / period,
+        TURN / period * period_error / period,
         float(times[0]),
         t_0_error,
         scatter,

@@ -70,7 +70,16 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
             f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
             "mass, upwards, at a rate that shows its flights"
         )
-    acceleration, error, noise = _common_fall(t, z, rows)
+    parts, freedom = [], -1
+    for a, b in rows:  # of each flight its own line is taken out
+        s = t[a : b + 1] - t[a]
+        Q, _ = np.linalg.qr(np.column_stack([np.ones_like(s), s]))
+        parts.append([y - Q @ (Q.T @ y) for y in (0.5 * s * s, z[a : b + 1])])
+        freedom += len(s) - 2
+    q, y = map(np.concatenate, zip(*parts, strict=True))
+    acceleration = float(q @ y / (q @ q))
+    left = y - acceleration * q
+    noise = math.sqrt(float(left @ left) / max(freedom, 1))
     first, last = np.array(rows).T
     return xr.Dataset(
         {
@@ -79,7 +88,7 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
             "begin": ("flight", t[first], {"units": "s"}),
             "end": ("flight", t[last], {"units": "s"}),
             "acceleration": labelled((), acceleration, "acceleration in flight"),
-            "acceleration_error": ((), error),
+            "acceleration_error": ((), noise / math.sqrt(float(q @ q))),
             "noise": labelled((), noise, "standard deviation of a sample"),
         }
     )
@@ -120,7 +129,7 @@ def restitution(
         If values are missing.
     """
     t, z = signal(time, height, least=12, purpose="restitution")
-    found, sides = [], []
+    found = []
     for k, before, after in single_contacts(t, flights, window, longest):
         if min(len(t[before]), len(t[after])) < 4:
             continue
@@ -130,20 +139,14 @@ def restitution(
         real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
         inside = real[(real >= 0.0) & (real <= length)]
         when = float(inside[0]) if len(inside) == 1 else 0.5 * length  # where the two parabolas meet
-        found.append((k, t[i] + when, t[j] - t[i], np.polyval(left.p, when), when))
-        sides.append((left, right))
-    freedom = sum(side.freedom for pair in sides for side in pair)
-    noise = math.sqrt(sum(side.squares for pair in sides for side in pair) / freedom) if freedom else math.nan
+        row = {"flight": k, "impact_time": t[i] + when, "duration": t[j] - t[i]}
+        found.append((row | {"impact_height": np.polyval(left.p, when)}, left, right, when))
+    sides = [side for _, left, right, _ in found for side in (left, right)]
+    freedom = sum(side.freedom for side in sides)
+    noise = math.sqrt(sum(side.squares for side in sides) / freedom) if freedom else math.nan
     rows = [
-        {
-            "flight": k,
-            "impact_time": at,
-            "duration": duration,
-            "impact_height": height,
-            "v_before": left.slope(when, noise),
-            "v_after": right.slope(when, noise),
-        }
-        for (k, at, duration, height, when), (left, right) in zip(found, sides, strict=True)
+        row | {"v_before": left.slope(when, noise), "v_after": right.slope(when, noise)}
+        for row, left, right, when in found
     ]
     return impacts_of(rows, {"impact_height": (float, "height at the impact")}).assign_attrs(noise=noise)
 
@@ -180,24 +183,6 @@ def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type,
     data["flight"] = labelled("impact", column("flight", int), "flight before")
     data |= {name: labelled("impact", column(name, kind), text) for name, (kind, text) in more.items()}
     return xr.Dataset(data)
-
-
-def _common_fall(t: FloatArray, z: FloatArray, rows: list[tuple[int, int]]) -> tuple[float, float, float]:
-    """Acceleration common to all flights, its error, and the noise: each flight's line is taken out first."""
-    top = bottom = squares = 0.0
-    parts, freedom = [], -1
-    for a, b in rows:
-        s = t[a : b + 1] - t[a]
-        Q, _ = np.linalg.qr(np.column_stack([np.ones_like(s), s]))
-        q, y = 0.5 * s * s, z[a : b + 1]
-        q, y = q - Q @ (Q.T @ q), y - Q @ (Q.T @ y)
-        top, bottom = top + (q @ y), bottom + (q @ q)
-        parts.append((q, y))
-        freedom += len(s) - 2
-    fall = top / bottom
-    squares = sum(float((y - fall * q) @ (y - fall * q)) for q, y in parts)
-    noise = math.sqrt(squares / max(freedom, 1))
-    return fall, noise / math.sqrt(bottom), noise
 
 
 class _Side:

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import whose
 from nonsmooth.recordings.signals.restitution import impacts_of, single_contacts
+from nonsmooth.recordings.signals.sections import first_zero
 
 _COLUMNS = {
     "corner": (int, "row of the corner"),
@@ -122,7 +123,8 @@ def corner_restitution(
         corner = int(np.argmin(before.heights(0.5 * (begin + end), points)))
         grid = np.linspace(begin, end, 41)
         apart = np.array([before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid])
-        when = _nearest_zero(grid, apart)
+        when = first_zero(grid, apart)
+        when = float(grid[np.argmin(np.abs(apart))]) if math.isnan(when) else when
         heights, point = before.heights(when, points), points[corner]
         moved = (when + half_sample, when - half_sample)
         late, early = (-after.velocity(s, point)[0] / before.velocity(s, point)[0] for s in moved)
@@ -144,15 +146,6 @@ def corner_restitution(
             }
         )
     return impacts_of(rows, _COLUMNS).assign_attrs(left_out=max(flights.sizes["flight"] - 1, 0) - len(rows))
-
-
-def _nearest_zero(t: FloatArray, y: FloatArray) -> float:
-    """Zero of y between two of its samples; where there is none, the sample nearest to zero."""
-    k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
-    if len(k) == 0:
-        return float(t[np.argmin(np.abs(y))])
-    i = int(k[0])
-    return float(t[i] + (t[i + 1] - t[i]) * y[i] / (y[i] - y[i + 1]))
 
 
 class _Flight:

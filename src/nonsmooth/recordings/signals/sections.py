@@ -18,6 +18,15 @@ from nonsmooth.recordings.signals.phase import DrivePhase
 from nonsmooth.results.labels import labelled
 
 
+def first_zero(x: FloatArray, y: FloatArray) -> float:
+    """The first zero of y over x, straight between two samples of other signs; NaN where there is none."""
+    found = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
+    if not len(found):
+        return np.nan
+    i = found[0]
+    return float(x[i] + (x[i + 1] - x[i]) * y[i] / (y[i] - y[i + 1]))
+
+
 class Known(TypedDict, total=False):
     """Of a motion, beside its positions and velocities; ``impacts`` are times at which the velocity jumps."""
 

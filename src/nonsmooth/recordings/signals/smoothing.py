@@ -94,18 +94,14 @@ def smooth(
     if not (math.isfinite(noise) and noise >= 0):
         raise ValueError(f"{whose(x)}: noise must be a standard deviation >= 0, got {noise!r}")
     t, values = signal(time, x, least=2 * order, purpose="smoothing", missing="keep")
-    nodes = _Nodes(t, values, _places(t, impacts, x), _bounds(contacts, x), order, resolution, noise)
-    return nodes.result(nodes.likeliest() if intensity is None else nodes.scaled(intensity), model, x)
-
-
-def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
-    found = np.unique(np.asarray(places, float).ravel())
-    if len(found) and not (t[0] < found[0] and found[-1] < t[-1]):
+    places = np.unique(np.asarray(impacts, float).ravel())
+    if len(places) and not (t[0] < places[0] and places[-1] < t[-1]):
         raise ValueError(
             f"{whose(x)}: impacts must lie inside the record, {t[0]:.9g} to {t[-1]:.9g} s; "
-            f"given are {found[0]:.9g} to {found[-1]:.9g} s"
+            f"given are {places[0]:.9g} to {places[-1]:.9g} s"
         )
-    return found
+    nodes = _Nodes(t, values, places, _bounds(contacts, x), order, resolution, noise)
+    return nodes.result(nodes.likeliest() if intensity is None else nodes.scaled(intensity), model, x)
 
 
 def _bounds(contacts: Any, x: Any) -> FloatArray:
@@ -156,18 +152,15 @@ class _Nodes:
         # At the bound of a soft contact the force turns off its course: the jerk jumps.
         self.jump = np.select([self.kind == 2, self.kind == 3], [1, min(3, order)], order).astype(np.int64)
         self.inside = np.searchsorted(contacts, when[sort] - 0.5 * self.step * self.h, side="right") % 2 == 1
-        self.wide = self._wide(t[good] / self.h, (x[good] - self.offset) / self.sigma)
+        # Variances far above those of the state: a start, or a derivative that jumps, is not to be guided.
+        steps, level, wide = np.diff(t[good] / self.h), (x[good] - self.offset) / self.sigma, []
+        for _ in range(order):
+            wide.append(1e2 * np.max(np.abs(level)) ** 2 + 1e2)
+            level = np.diff(level) / np.maximum(steps[: len(level) - 1], 0.2)
+        self.wide = np.array(wide)
         n, count_nodes = order, len(when)
         self.u, self.P = np.zeros((2, count_nodes, n)), np.zeros((2, count_nodes, n, n))  # predicted, filtered
         self.work, self.sums = np.zeros((5, n, n)), np.zeros(2)
-
-    def _wide(self, t: FloatArray, y: FloatArray) -> FloatArray:
-        """Variances far above those of the state: a start, or a derivative that jumps, is not to be guided."""
-        level, wide = y, []
-        for k in range(self.order):
-            wide.append(1e2 * np.max(np.abs(level - (level[0] if k == 0 else 0.0))) ** 2 + 1e2)
-            level = np.diff(level) / np.maximum(np.diff(t[: len(level)]), 0.2)
-        return np.array(wide)
 
     def scaled(self, intensity: float | tuple[float, float]) -> FloatArray:
         given = np.atleast_1d(np.asarray(intensity, float))
@@ -366,7 +359,8 @@ def savitzky_golay(
                 )
             piece = values[here]
             states[k, here] = savgol_filter(piece, window, order, deriv=k, delta=step)
-            place = np.minimum(np.minimum(np.arange(len(here)), np.arange(len(here))[::-1]), half)
+            place = np.minimum(np.arange(len(here)), half)
+            place = np.minimum(place, place[::-1])
             errors[k, here] = np.array(norms)[place] * resolution / math.sqrt(12.0)
             finer = savgol_filter(piece, window, min(order + 2, window - 1), deriv=k, delta=step)
             bias.append(finer[half:-half] - states[k, here][half:-half])

@@ -297,12 +297,11 @@ class _Shape:
         if not math.isfinite(variance) or three[1] == 0:
             return math.nan
         step = 1e-5 * abs(three[1])
-        slope = np.array(
-            [
-                (self.interpolate(three + e, interpolation)[0] - self.interpolate(three - e, interpolation)[0])
-                for e in step * np.eye(3)
-            ]
-        ) / (2 * step)
+        ahead, behind = (
+            np.array([self.interpolate(three + e, interpolation)[0] for e in side * np.eye(3)])
+            for side in (step, -step)
+        )
+        slope = (ahead - behind) / (2 * step)
         lag = np.arange(3)
         squares = self._lines(self.weights**2)[::FINE][np.abs(np.subtract.outer(lag, lag))]
         C = 2.0 * variance / self.total**2 * squares

@@ -138,8 +138,9 @@ def model_source(traced: Traced) -> str:
 
 
 def _asked(traced: Traced, mode: int) -> list[Expr]:
-    """The indicators, zero in place of those that are not asked for in a mode."""
-    return [Integer(0) if traced.is_idle(mode, i) else h for i, h in enumerate(traced.indicators)]
+    """The indicators, zero in place of those that are not asked for in a mode: they are not computed there."""
+    idle = () if traced.decider is None else traced.decider.idle[mode]
+    return [Integer(0) if i in idle else h for i, h in enumerate(traced.indicators)]
 
 
 def _inlined(lines: list[str]) -> list[str]:

@@ -40,23 +40,9 @@ def jet_code(
     """Write the bodies of the functions ``jet`` of the groups. In them the name of a table stands for its entry of the
     mode; rows that are zero are not written.
 
-    Parameters
-    ----------
-    t, u
-        The variables.
-    constants
-        Parameter or memory symbol -> identifier.
-    fields
-        du/dt in each mode, one expression per state.
-    rows
-        Further expressions in each mode whose series along the flow are wanted: indicators, then outputs. One with a
-        corner (abs, maximum, ...) gets its value as coefficient 0 and NaN as the others.
-
-    Raises
-    ------
-    SystemDefinitionError
-        A field has a corner, or holds a function without known series.
-    """
+    ``constants`` names parameters and memory; ``fields`` are du/dt in each mode, ``rows`` further expressions whose
+    series along the flow are wanted: indicators, then outputs. A row with a corner (abs, maximum, ...) has its value as
+    coefficient 0 and NaN as the others; a field with one, or a function without known series, is refused."""
     series = Series(t, tuple(u), constants)
     modes = [_mode(series, *given) for given in zip(fields, rows, strict=True)]
     n, n_rows = len(u), len(rows[0])

@@ -9,9 +9,9 @@ apart, once per system; the matrices of any number of parameter points then come
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
-from functools import lru_cache
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,27 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
+#: The tables of a parameter point, by the letters of what they are for: modes, n states, h harmonics, indicators,
+#: outputs and resets.
+SHAPES = {
+    "omega": "",
+    "A": "mnn",
+    "b": "mn",
+    "c": "mhn",
+    "s": "mhn",
+    "ia": "in",
+    "ib": "i",
+    "ic": "ih",
+    "is_": "ih",
+    "oa": "omn",
+    "ob": "om",
+    "oc": "omh",
+    "os": "omh",
+    "ra": "rnn",
+    "rb": "rn",
+    "rc": "rhn",
+    "rs": "rhn",
+}
 Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> coefficient in the parameters
 
 
@@ -59,9 +80,8 @@ class LinearTables:
             return np.where(self.omega > 0.0, 2.0 * np.pi / self.omega, np.inf)
 
 
-@dataclass(frozen=True)
 class LinearForm:
-    """The linear form of a system whose modes are all linear.
+    """The linear form of a system whose modes are all linear: the entries of its tables, and functions that fill them.
 
     Attributes
     ----------
@@ -71,11 +91,28 @@ class LinearForm:
         Whether all of them have the form above; an output that has not is NaN.
     """
 
-    multiples: tuple[int, ...]
-    affine_indicators: bool
-    affine_resets: bool
-    _code: _TablesCode = field(repr=False, compare=False)
-    _fills: dict[Any, Callable[..., None]] = field(default_factory=dict, repr=False, compare=False)
+    def __init__(self, traced: Traced, base: Expr | None, affine_indicators: bool, affine_resets: bool) -> None:
+        self.traced, self.base = traced, base
+        self.affine_indicators, self.affine_resets = affine_indicators, affine_resets
+        self._entries: list[tuple[str, list[int], int, Expr]] = []  # table, place but for the harmonic, that, formula
+        self._fills: dict[Any, Callable[..., None]] = {}
+
+    def add(self, vectors: Sequence[list[Terms]], a: str, b: str, c: str, s: str) -> None:
+        """Add vectors to the tables of the states, the constant, cosines and sines."""
+        for lead, vector in enumerate(vectors):
+            for i, terms in enumerate(vector):
+                place = [lead, i][len(SHAPES[b]) == 1 :]  # indicators are one vector
+                for key, coefficient in terms.items():
+                    if not isinstance(key, tuple):
+                        self._entries.append((b, place, 0, coefficient))
+                    elif key[0] == "u":
+                        self._entries.append((a, [*place, key[1]], 0, coefficient))
+                    else:
+                        self._entries.append((c if key[0] == "cos" else s, place, key[1], coefficient))
+
+    @cached_property
+    def multiples(self) -> tuple[int, ...]:
+        return tuple(sorted({k for _, _, k, _ in self._entries if k}))
 
     def evaluate(self, points: FloatArray, place: int | None = None) -> LinearTables:
         """All matrices at points (P, n_parameters), not finite where a formula is not (a division by a zero parameter).
@@ -83,7 +120,16 @@ class LinearForm:
         With ``place`` the derivatives of all entries in that parameter, at fixed states and time (``omega``: of the
         frequency)."""
         points = np.asarray(points, dtype=np.float64)
-        shapes = self._code.shapes(len(self.multiples))
+        t = self.traced
+        sizes = {
+            "n": len(t.u) + len(t.m),
+            "m": len(t.fields),
+            "h": len(self.multiples),
+            "i": len(t.indicators),
+            "o": len(t.outputs),
+            "r": len(t.transitions),
+        }
+        shapes = {name: [sizes[letter] for letter in letters] for name, letters in SHAPES.items()}
         tables = {name: np.zeros((len(points), *shape)) for name, shape in shapes.items()}
         with np.errstate(all="ignore"):
             self._filler(place, tuple(tables))(np.ascontiguousarray(points.T), **tables)
@@ -97,10 +143,28 @@ class LinearForm:
             self._filler(place, tuple(tables), again)(values[:, None], **tables)
 
     def _filler(self, place: int | None, names: tuple[str, ...], again: bool = False) -> Callable[..., None]:
-        if (place, names, again) not in self._fills:
-            namespace: dict[str, Any] = {"np": np}
-            exec(compile(self._code.source(self.multiples, place, names, again), "<linear form>", "exec"), namespace)
-            self._fills[place, names, again] = namespace["fill"]
+        """The function that fills some tables, or those of the derivatives in one parameter; ``again``: all that
+        depends on parameters."""
+        if (place, names, again) in self._fills:
+            return self._fills[place, names, again]
+        targets: list[tuple[str, Expr]] = [] if self.base is None else [("omega[:]", self.base)]
+        for table, index, k, coefficient in self._entries:
+            if table in names:
+                where = list(index)
+                if k:
+                    where.insert(SHAPES[table].index("h"), self.multiples.index(k))
+                targets.append((f"{table}[{', '.join([':', *map(str, where)])}]", coefficient))
+        if place is not None:
+            targets = [(target, sympy.diff(e, self.traced.p[place])) for target, e in targets]
+            targets = [(target, e) for target, e in targets if e != 0]
+        if again:
+            targets = [(target, e) for target, e in targets if e.free_symbols]
+        printer = Printer({symbol: f"p[{i}]" for i, symbol in enumerate(self.traced.p)}, arrays=True)
+        lines = assignments(targets, printer, "g") or ["pass"]
+        source = f"def fill(p, {', '.join(names)}):\n" + "".join(f"    {line}\n" for line in lines)
+        namespace: dict[str, Any] = {"np": np}
+        exec(compile(source, "<linear form>", "exec"), namespace)
+        self._fills[place, names, again] = namespace["fill"]
         return self._fills[place, names, again]
 
 
@@ -126,16 +190,13 @@ def linear_form(traced: Traced) -> LinearForm | None:
     outputs = [taking.all_or_none(row) for row in traced.outputs]
     resets = [taking.all_or_none(_map_of(t, traced)) for t in traced.transitions]
     affine_resets = all(r is not None for r in resets)
-
-    code = _TablesCode(traced, taking.base)
-    for mode, vector in enumerate(fields):
-        code.add(vector or [], "A", "b", "c", "s", (mode,), split=True)
-    code.add(indicators or [], "ia", "ib", "ic", "is_", (), split=False)
-    for i, row in enumerate(outputs):
-        code.add(row or [{"1": sympy.nan}] * len(fields), "oa", "ob", "oc", "os", (i,), split=False)
-    for i, vector in enumerate(resets):
-        code.add((vector if affine_resets else None) or taking.identity(), "ra", "rb", "rc", "rs", (i,), split=True)
-    return LinearForm(code.multiples(), indicators is not None, affine_resets, code)
+    unknown: list[Terms] = [{"1": sympy.nan}] * len(fields)
+    form = LinearForm(traced, taking.base, indicators is not None, affine_resets)
+    form.add([vector or [] for vector in fields], "A", "b", "c", "s")
+    form.add([indicators or []], "ia", "ib", "ic", "is_")
+    form.add([row or unknown for row in outputs], "oa", "ob", "oc", "os")
+    form.add([(affine_resets and vector) or taking.identity() for vector in resets], "ra", "rb", "rc", "rs")
+    return form
 
 
 def _map_of(transition: TracedTransition, traced: Traced) -> tuple[Expr, ...]:
@@ -265,69 +326,3 @@ def _times(x: Hashable, y: Hashable) -> Terms:
         _accumulate(total, _harmonic(k + m, sympy.S.Zero, half))
         _accumulate(total, _harmonic(k - m, sympy.S.Zero, half))
     return total
-
-
-class _TablesCode:
-    """Collects the entries of the tables and writes the NumPy function that fills them."""
-
-    def __init__(self, traced: Traced, base: Expr | None) -> None:
-        self.traced, self.base = traced, base
-        self.entries: list[tuple[str, tuple[int, ...], Hashable, bool, Expr]] = []
-
-    def add(self, rows: list[Terms], a: str, b: str, c: str, s: str, lead: tuple[int, ...], split: bool) -> None:
-        """Rows of one table: ``lead`` are the indices before the row's; ``split`` puts the harmonic before the row."""
-        for i, terms in enumerate(rows):
-            for key, coefficient in terms.items():
-                if key == "1":
-                    self.entries.append((b, (*lead, i), None, False, coefficient))
-                elif isinstance(key, tuple) and key[0] == "u":
-                    self.entries.append((a, (*lead, i, key[1]), None, False, coefficient))
-                elif isinstance(key, tuple):
-                    self.entries.append((c if key[0] == "cos" else s, (*lead, i), key[1], split, coefficient))
-
-    def multiples(self) -> tuple[int, ...]:
-        """The harmonics that occur."""
-        return tuple(sorted({k for _, _, k, _, _ in self.entries if isinstance(k, int)}))
-
-    def source(self, multiples: tuple[int, ...], place: int | None, names: tuple[str, ...], again: bool) -> str:
-        """The function that fills some tables, or those of the derivatives in one parameter; ``again``: all that
-        depends on parameters."""
-        targets: list[tuple[str, Expr]] = [] if self.base is None else [("omega[:]", self.base)]
-        for table, index, k, split, coefficient in self.entries:
-            if table not in names:
-                continue
-            if isinstance(k, int):
-                h = multiples.index(k)
-                index = (*index[:-1], h, index[-1]) if split else (*index, h)
-            targets.append((f"{table}[{', '.join([':', *map(str, index)])}]", coefficient))
-        if place is not None:
-            targets = [(target, sympy.diff(e, self.traced.p[place])) for target, e in targets]
-            targets = [(target, e) for target, e in targets if e != 0]
-        if again:
-            targets = [(target, e) for target, e in targets if e.free_symbols]
-        printer = Printer({symbol: f"p[{i}]" for i, symbol in enumerate(self.traced.p)}, arrays=True)
-        lines = assignments(targets, printer, "g") or ["pass"]
-        return f"def fill(p, {', '.join(names)}):\n" + "".join(f"    {line}\n" for line in lines)
-
-    def shapes(self, h: int) -> dict[str, tuple[int, ...]]:
-        t = self.traced
-        n, m, i, o, r = len(t.u) + len(t.m), len(t.fields), len(t.indicators), len(t.outputs), len(t.transitions)
-        return {
-            "omega": (),
-            "A": (m, n, n),
-            "b": (m, n),
-            "c": (m, h, n),
-            "s": (m, h, n),
-            "ia": (i, n),
-            "ib": (i,),
-            "ic": (i, h),
-            "is_": (i, h),
-            "oa": (o, m, n),
-            "ob": (o, m),
-            "oc": (o, m, h),
-            "os": (o, m, h),
-            "ra": (r, n, n),
-            "rb": (r, n),
-            "rc": (r, h, n),
-            "rs": (r, h, n),
-        }

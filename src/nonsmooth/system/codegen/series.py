@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import sympy
 from sympy import Basic, Expr, Symbol
+from sympy.logic.boolalg import Boolean
 
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.codegen import recurrences
 from nonsmooth.system.codegen.recurrences import Node
-from nonsmooth.system.symbolic.printing import Printer, assignments, is_corner
+from nonsmooth.system.symbolic.printing import CORNERS, Printer, assignments
 
 ZERO, ONE = sympy.S.Zero, sympy.S.One
 _NAMED = re.compile(r"\bh\d+\b")
@@ -57,21 +58,9 @@ def _times_of(a: int, b: int) -> Callable[[int], Node]:
 
 
 class Series:
-    """The nodes that some expressions need, the states being the first.
+    """The nodes that some expressions need, the states being the first; ``time`` is that of the time itself, or -1.
 
-    Parameters
-    ----------
-    t, u : Symbol, tuple of Symbol
-        The variables; all other symbols are constant along a trajectory.
-    names : dict
-        Constant symbol -> identifier.
-
-    Attributes
-    ----------
-    nodes : list of Node
-    time : int
-        The node that is the time itself, or -1.
-    """
+    The variables are t and u; all other symbols, by ``names``, are constant along a trajectory."""
 
     def __init__(self, t: Symbol, u: tuple[Symbol, ...], names: dict[Basic, str]) -> None:
         self.t, self.u, self.names = t, u, names
@@ -108,6 +97,10 @@ class Series:
         """Functions of ``math`` that the code needs."""
         return self._printer.used
 
+    def _at_first(self, function: str, a: Linear) -> str:
+        """The text of coefficient 0 of a function of a linear form."""
+        return f"{self._math(function)}({self.combination(a, True)})"
+
     def _math(self, function: str) -> str:
         self._printer.used.add(function)
         return function
@@ -126,15 +119,8 @@ class Series:
         return " + ".join(parts).replace("+ -", "- ") or "0.0"
 
     def linear(self, expression: Expr) -> Linear:
-        """The expression as a linear form over nodes, making the nodes it needs.
-
-        Raises
-        ------
-        CornerError
-            The expression has a corner in a variable.
-        SystemDefinitionError
-            It holds a function without known series.
-        """
+        """The expression as a linear form over nodes, making the nodes it needs; CornerError where it has a corner in a
+        variable, SystemDefinitionError where it holds a function without known series."""
         if expression not in self._linear:
             self._linear[expression] = self._taken_apart(expression)
         return self._linear[expression]
@@ -155,7 +141,7 @@ class Series:
             return self._power(*e.args)
         if isinstance(e, sympy.Piecewise) and not any(c.free_symbols & self._variables for _, c in e.args):
             return self._chosen(e)
-        if is_corner(e):
+        if isinstance(e, (*CORNERS, Boolean)):
             raise CornerError(f"{e} has a corner")
         if isinstance(e, sympy.atan2):
             return self._atan2(*e.args)
@@ -211,8 +197,11 @@ class Series:
             return _single(a, factor)
         b = self._times([node for _, node in bottom])
         if not above:
-            return _single(self._node(("inverse", b), lambda y: recurrences.inverse(y, b)), factor)
+            return self._inverse(b, factor)
         return _single(self._node(("quotient", a, b), lambda y: recurrences.quotient(y, a, b)), factor)
+
+    def _inverse(self, b: int, factor: Expr) -> Linear:
+        return _single(self._node(("inverse", b), lambda y: recurrences.inverse(y, b)), factor)
 
     def _times(self, factors: list[int]) -> int:
         """Product of nodes; pairs that exist already are used first."""
@@ -232,7 +221,7 @@ class Series:
         if isinstance(exponent, sympy.Integer) and (exponent > 0 or exponent == -1):
             factor, a = self._stripped(self.linear(base))
             if exponent == -1:
-                return _single(self._node(("inverse", a), lambda y: recurrences.inverse(y, a)), 1 / factor)
+                return self._inverse(a, 1 / factor)
             return _single(self._integer_power(a, int(exponent)), factor**exponent)
         # A factor stays inside: it may be negative, and so may the rest.
         a = self._whole(self.linear(base))
@@ -288,7 +277,7 @@ class Series:
         return a.terms[0][1] if len(a.terms) == 1 and a.terms[0][0] == self.time else None
 
     def _exponential(self, a: Linear) -> Linear:
-        value, rate = f"{self._math('exp')}({self.combination(a, True)})", self._rate_in_time(a)
+        value, rate = self._at_first("exp", a), self._rate_in_time(a)
         if rate is not None:
             w = self.constant(rate)
             return _single(self._node(("exp", a), lambda y: recurrences.exponential_in_time(y, value, w)))
@@ -302,8 +291,8 @@ class Series:
 
     def _pair(self, a: Linear, odd: str, even: str) -> int:
         """The node of sin or sinh; that of cos or cosh is the next."""
-        argument, rate, hyperbolic = self.combination(a, True), self._rate_in_time(a), odd == "sinh"
-        values = f"{self._math(odd)}({argument})", f"{self._math(even)}({argument})"
+        values, hyperbolic = (self._at_first(odd, a), self._at_first(even, a)), odd == "sinh"
+        rate = self._rate_in_time(a)
         if rate is not None:
             w = self.constant(rate)
             return self._two_nodes((odd, a), lambda y: recurrences.circular_in_time(y, values, w, hyperbolic))
@@ -312,7 +301,7 @@ class Series:
         return self._two_nodes((odd, a), lambda y: recurrences.circular(y, x, values, w, hyperbolic))
 
     def _tangent(self, a: Linear, name: str) -> Linear:
-        value, (factor, x) = f"{self._math(name)}({self.combination(a, True)})", self._stripped(a)
+        value, (factor, x) = self._at_first(name, a), self._stripped(a)
         w = self.constant(factor)
         return _single(self._two_nodes((name, a), lambda y: recurrences.tangent(y, x, value, w, name == "tanh")))
 

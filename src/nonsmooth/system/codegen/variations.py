@@ -30,7 +30,7 @@ from nonsmooth.system.codegen.generate import (
     unpacked,
 )
 from nonsmooth.system.codegen.jet import chain, jet_code
-from nonsmooth.system.symbolic.traced import Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition, along
 
 ZERO, CONSTANT, VARYING = 0, 1, 2
 FOUR = 4  # columns in a vector (``kernels.lanes``)
@@ -174,21 +174,17 @@ def _switch(traced: Traced, jump: TracedTransition, wanted: list[sp.Symbol]) -> 
     values += [_derivative(e, s) for e in after for s in p]
     for row in jump.rows:
         h = traced.indicators[row.indicator]
-        values += [h, *(_derivative(h, s) for s in z), _derivative(h, traced.t), *(_derivative(h, s) for s in p)]
+        values += [h, *(_derivative(h, s) for s in (*z, traced.t, *p))]
     return [(f"out[{i}]", e) for i, e in enumerate(values)]
 
 
 def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode: int) -> Callable[..., Any]:
     """``f(t, u, q) -> tuple``: h, h_z, h_t, h_p, and so for L_f h and L_f^2 h, all in a row."""
     variables = [*traced.u, *traced.m, traced.t, *(traced.p[i] for i in active)]
-    flow = list(zip(traced.u, traced.fields[mode], strict=True))
-
-    def along(e: sp.Expr) -> sp.Expr:
-        return e.diff(traced.t) + sp.Add(*(e.diff(u) * f for u, f in flow))
-
-    h = traced.indicators[indicator]
-    slope = along(h)
-    values = [e for one in (h, slope, along(slope)) for e in (one, *(one.diff(s) for s in variables))]
+    rates = [traced.indicators[indicator]]
+    for _ in range(2):
+        rates.append(along(rates[-1], traced.t, traced.u, traced.fields[mode]))
+    values = [e for one in rates for e in (one, *(one.diff(s) for s in variables))]
     lines, used = scalar_code(traced, [(f"r{i}", e) for i, e in enumerate(values)])
     constants = unpacked(lines)
     result = ", ".join(f"r{i}" for i in range(len(values)))

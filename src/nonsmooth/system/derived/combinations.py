@@ -6,9 +6,11 @@ the system without a line for elements.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +21,6 @@ from nonsmooth.system.derived.assembly import Pattern, VaryingError
 from nonsmooth.system.derived.decider import Decider
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.expressions import Expressions
-from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols, call_vector
 from nonsmooth.system.transition import Mode, Surface, Transition
@@ -66,55 +67,46 @@ def assembled(
     values: Mapping[sp.Symbol, float],
     named: Callable[[list[str]], str] | None = None,
 ) -> dict[str, Any]:
-    """Modes, indicators, transitions and outputs of a system with elements, as a user would give them.
+    """Modes, indicators, transitions and outputs of a system with elements, as a user would give them, and what binds
+    the equations that are traced of them to the elements.
 
     ``given`` is a system's own: its transitions go from each combination of phases to the same of the target.
     ``named`` gives the name of a combination, where elements are not the user's; these then have no outputs.
     """
     parts, modes = element_names(given["elements"]), given["modes"]
     for key, mode in modes.items():
-        if isinstance(mode, Mode) and set(mode.states or symbols.u) != set(symbols.u):
+        if set(mode.states or symbols.u) != set(symbols.u):
             raise SystemDefinitionError(f"mode {key!r}: a system with elements has all its states in every mode")
-    arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
     base = {
-        key: call_vector(
-            mode.field if isinstance(mode, Mode) else mode,
-            arguments,
-            tuple(symbols.u),
-            f"the vector field of mode {key!r}",
-        )
+        key: call_vector(mode.field, symbols.arguments(), tuple(symbols.u), f"the vector field of mode {key!r}")
         for key, mode in modes.items()
     }
     resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
     make = Expressions(symbols, base, parts, given["scale"], values)
-    counts = [len(part.element.phases) for part in make.parts]
-    number = len(base) * int(sp.prod(counts))
+    number = len(base) * math.prod(len(part.element.phases) for part in make.parts)
     make.sequential = given["impacts"] == "sequential" and len(make.striking) > 1
     if number > MOST or make.rubbing or make.sequential:
         why = f"have more than {MOST} combinations of phases"
-        return _opened(make, base, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
-    make.asks = _decide_together(make, base, resets)
+        return _opened(make, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
+    make.asks = _decide_together(make, resets)
     visited = make.asks and not given["written"] and named is None and not any(given[key] for key in ALONE_WITH)
-    if visited and (patterns := _affine(make, base, given)) is not None:
-        return {**_opened(make, base, given, "decide together", patterns), "also written": True}
+    if visited and (patterns := _affine(make, given)) is not None:
+        return {**_opened(make, given, "decide together", patterns), "also written": True}
     try:
-        return _written_out(make, base, given, counts, named)
+        return _written_out(make, given, named)
     except VaryingError as error:
-        if named is not None or (patterns := _affine(make, base, given)) is None:
+        if named is not None or (patterns := _affine(make, given)) is None:
             raise
         why = f"hold together by sums of forces that depend on parameters ({error.names})"
-        return _opened(make, base, given, why, patterns)
+        return _opened(make, given, why, patterns)
 
 
 def _written_out(
-    make: Expressions,
-    base: Mapping[str, tuple[sp.Expr, ...]],
-    given: Mapping[str, Any],
-    counts: Sequence[int],
-    named: Callable[[list[str]], str] | None,
+    make: Expressions, given: Mapping[str, Any], named: Callable[[list[str]], str] | None
 ) -> dict[str, Any]:
     """A mode for each combination that may be."""
-    every = product(base, product(*[range(count) for count in counts]))
+    base, phases = make.fields, [range(len(part.element.phases)) for part in make.parts]
+    every = product(base, product(*phases))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
 
     def name(mode: str, pattern: Pattern) -> str:
@@ -123,7 +115,7 @@ def _written_out(
         words = [f"{part.name}_{part.element.phases[k]}" for part, k in zip(make.parts, pattern, strict=True)]
         return "_".join(words if len(base) == 1 else [mode, *words])
 
-    fields: dict[str, Any] = {}
+    fields: dict[str, Mode] = {}
     forces: dict[str, dict[str, Any]] = {part.name: {} for part in make.parts}
     transitions: list[Transition | Surface] = []
     kinds: list[str] = []  # of the transitions
@@ -131,7 +123,7 @@ def _written_out(
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
-        fields[here] = KnownFunction(f)
+        fields[here] = Mode(KnownFunction(f))
         for k, part in enumerate(make.parts):
             forces[part.name][here] = KnownFunction(found[k])
         for k, part in enumerate(make.parts):
@@ -149,7 +141,8 @@ def _written_out(
                 transitions.append(Transition(here, name(mode, there), when=when, reset=reset, contact=contact))
                 kinds.append(ALONE if make.asks and part.element.held else "")
         if make.asks:
-            asked.append((here, TOGETHER, _meetings(make, mode, pattern), -1))
+            met = [make.condition([one], make.parts[k].name) for k, one in make.meetings(mode, pattern)]
+            asked.append((here, TOGETHER, " and ".join(met), -1))
         for item in given["transitions"]:
             if isinstance(item, Surface) and item.below == mode:
                 ends = name(item.below, pattern), name(item.above, pattern)
@@ -165,9 +158,9 @@ def _written_out(
                 contact = item.begins_contact(next(iter(base)))
                 transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write, contact))
                 kinds.append(OWN if item.reset is None else ASKS_BEHIND)
+    decider = Decider(make, pairs, _affine(make, given)) if make.asks else None
     outputs = {}
-    for key, output in given["outputs"].items():
-        function, unit = output if isinstance(output, (tuple, list)) else (output, "")
+    for key, (function, unit) in given["outputs"].items():
         if isinstance(function, Mapping):
             function = {name(mode, pattern): function[mode] for mode, pattern in pairs}
         outputs[key] = function, unit
@@ -176,41 +169,34 @@ def _written_out(
         "transitions": transitions,
         "indicators": {**given["indicators"], **{key: KnownFunction(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
-        **dict(zip(("ranges", "limits"), make.ranges(next(iter(base))), strict=True)),
-        "kinds": kinds,
-        "asked": asked,
-        "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None,
+        **make.ranges(next(iter(base))),
+        "bind": partial(decider.bind, kinds=kinds, asked=asked) if decider else None,
         "make": make,
     }
 
 
-def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
-    """The condition whose parts vanish where an element that is not held meets its own."""
-    return " and ".join(make.condition([one], make.parts[k].name) for k, one in make.meetings(mode, pattern))
-
-
-def _decide_together(make: Expressions, base: Mapping[str, Any], resets: bool) -> bool:
+def _decide_together(make: Expressions, resets: bool) -> bool:
     """Return whether the force of one element that may be held changes the rate of another at once, or a reset of the
     system's own may."""
     bearing = [k for k, part in enumerate(make.parts) if part.element.held]
     for k in bearing:
-        if any(make.vanishes(make.across(make.rate(k, mode), make.parts[k])) for mode in base):
+        if any(make.vanishes(make.across(make.rate(k, mode), make.parts[k])) for mode in make.fields):
             raise SystemDefinitionError(
                 f"element {make.parts[k].name!r}: its force does not change the rate that it holds at zero; on= names "
                 "the state whose derivative it adds to, as the speed"
             )
     pairs = combinations(bearing, 2)
-    return (bool(bearing) and resets) or any(make.coupled(i, j, mode) for i, j in pairs for mode in base)
+    return (bool(bearing) and resets) or any(make.coupled(i, j, mode) for i, j in pairs for mode in make.fields)
 
 
-def _affine(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]) -> Patterns | None:
+def _affine(make: Expressions, given: Mapping[str, Any]) -> Patterns | None:
     """Rows of numbers in place of expressions, where all is affine in the states; None where something is not."""
     from nonsmooth.system.derived.patterns import Patterns
 
-    mode = next(iter(base))
+    mode = next(iter(make.fields))
     bearing = [k for k, part in enumerate(make.parts) if part.element.held]
     known = {*make.values, make.symbols.t}
-    if len(base) > 1 or given["memory"]:
+    if len(make.fields) > 1 or given["memory"]:
         return None
     if any(not sp.diff(make.rate(k, mode), x).free_symbols <= known for k in bearing for x in make.u):
         return None
@@ -220,30 +206,24 @@ def _affine(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]
     return found if found.is_affine(given["period"]) else None
 
 
-def _opened(
-    make: Expressions,
-    base: Mapping[str, tuple[sp.Expr, ...]],
-    given: Mapping[str, Any],
-    why: str,
-    patterns: Patterns | None = None,
-) -> dict[str, Any]:
+def _opened(make: Expressions, given: Mapping[str, Any], why: str, patterns: Patterns | None = None) -> dict[str, Any]:
     """The system without its elements, with all that these need as indicators: modes are made when they are visited."""
     from nonsmooth.system.derived.patterns import Patterns
 
     make.asks = True
-    if len(base) > 1 or any(given[key] for key in ALONE_WITH):
+    if len(make.fields) > 1 or any(given[key] for key in ALONE_WITH):
         raise SystemDefinitionError(
             f"its elements {why}, so that their modes are made when they are visited: such a system has one mode and "
             "no indicators, transitions, memory, symmetry or bands of its own"
         )
-    patterns = patterns or Patterns(make, next(iter(base)))
+    patterns = patterns or Patterns(make, next(iter(make.fields)))
     patterns.why = why
     return {
-        "modes": {key: KnownFunction(list(field)) for key, field in base.items()},
+        "modes": {key: Mode(KnownFunction(list(field))) for key, field in make.fields.items()},
         "transitions": (),
         "indicators": {key: KnownFunction(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
         "outputs": given["outputs"],
-        **dict(zip(("ranges", "limits"), make.ranges(patterns.mode), strict=True)),
-        "patterns": patterns,
+        **make.ranges(patterns.mode),
+        "bind": patterns.bind,
         "make": make,
     }

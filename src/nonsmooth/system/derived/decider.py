@@ -42,7 +42,7 @@ class Decider:
         self._origin: Decider | None = None
         self.idle: list[set[int]] = []  # of each mode, the conditions of elements that are not asked for in it
 
-    def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
+    def bind(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
         """The system with all its combinations written out, with the questions (mode, kind, condition, stop) behind its
         transitions, which have these ``kinds``.
 

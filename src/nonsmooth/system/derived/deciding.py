@@ -25,7 +25,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.kernels.series.crossing import NOISE  # by which a march judges
-from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
+from nonsmooth.system.derived.enumerating import HELD, ORDERS, Candidates, moving_by_trial
 from nonsmooth.system.derived.faces import is_symmetric, least
 from nonsmooth.system.derived.impacts import Instant
 from nonsmooth.system.derived.instants import ZERO
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.instants import Ahead, Numbers
 
 PARTING = 1e-10  # of the scale of a rate: what parts faster is followed
-ORDERS = 24  # derivatives that are looked at where all before are zero
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from nonsmooth.system.derived.instants import ZERO
 
 MOST = 4096  # combinations that are tried
 SAME = 1e-9  # of the sizes of rates: two motions that differ by less are one
-ORDERS = 24
+ORDERS = 24  # derivatives that are looked at where all before are zero
 OPEN, HELD = 0, 2  # contact states; a slip is 1 or -1
 
 

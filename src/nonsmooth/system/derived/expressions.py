@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.derived.faces import INDEPENDENT
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
-from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
+from nonsmooth.system.symbolic.traced import along
+from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, one_number
 
 OTHER = 8  # draws from here on have other parameters too
 SPEED = sp.Symbol("speed_", real=True)  # in a law of it
@@ -44,7 +45,7 @@ class Expressions(Assembler):
     # What the user gave
 
     def _call(self, function: Any, what: str) -> sp.Expr:
-        return call_scalar(function, (Scalar(self.symbols.t), self.symbols.states(), self.symbols.parameters()), what)
+        return call_scalar(function, self.symbols.arguments(), what)
 
     def _given(self, given: Law, what: str) -> sp.Expr:
         """A number, the name of a parameter or of memory, or a function of t, u, p."""
@@ -53,7 +54,7 @@ class Expressions(Assembler):
             if given not in known:
                 raise SystemDefinitionError(f"{what}: {unknown(given, 'a parameter', 'this system', list(known))}")
             return known[given]
-        return self._call(given if callable(given) else (lambda t, u, p: given), what)
+        return self._call(given, what) if callable(given) else one_number(given, what)
 
     def _part(self, name: str, element: Element) -> Part:
         what, names = f"element {name!r}", list(self.symbols.u)
@@ -77,18 +78,12 @@ class Expressions(Assembler):
             return call_scalar(given, (Scalar(side * part.where), self.symbols.parameters()), what)
         return self._given(given, what)
 
-    @property
-    def names(self) -> list[str]:
-        """Names of the states."""
-        return list(self.symbols.u)
-
     def spoken(self, k: int, name: str) -> sp.Expr:
         """A law as an expression; one of the speed's magnitude in the symbol ``SPEED``."""
         given = getattr(self.parts[k].element, name)
         if callable(given) and _arguments(given) == 2:
             return call_scalar(given, (Scalar(SPEED), self.symbols.parameters()), name)
-        known = {part.name for part in self.parts}
-        return sp.Integer(0) if isinstance(given, str) and given in known else self.law(k, name)
+        return self.law(k, name)
 
     # Calculus
 
@@ -99,10 +94,7 @@ class Expressions(Assembler):
         return list(self.u)
 
     def along(self, expression: sp.Expr, field: Sequence[sp.Expr]) -> sp.Expr:
-        total = sp.diff(expression, self.symbols.t)
-        for symbol, entry in zip(self.u, field, strict=True):
-            total += sp.diff(expression, symbol) * entry
-        return sp.expand(total)
+        return sp.expand(along(expression, self.symbols.t, self.u, field))
 
     def across(self, expression: sp.Expr, part: Part) -> sp.Expr:
         return sp.Add(*[sp.diff(expression, self.u[i]) * d for i, d in part.direction.items()])
@@ -202,44 +194,30 @@ class Expressions(Assembler):
                 return False
         return True
 
-    def described(self) -> dict[str, dict[str, Any]]:
-        """The elements as data: kind, options, and expressions of where they are, what they act on, and their laws."""
-        found = {}
-        for k, part in enumerate(self.parts):
-            e, others = part.element, {other.name for other in self.parts} - {part.name}
-            known = {"at", "on", e.kinematics, "position", "belt", *e.laws}
-            options = {one.name: getattr(e, one.name) for one in fields(e) if one.name not in known}
-            named = {name: getattr(e, name) for name in e.laws if isinstance(getattr(e, name), str)}
-            options |= {name: value for name, value in named.items() if value in others}
-            laws = {name: self.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
-            found[part.name] = {
-                "kind": type(e).__name__,
-                "options": options,
-                e.kinematics: part.where,
-                "on": {self.names[i]: d for i, d in part.direction.items() if d != 0},
-                "laws": {name: law for name, law in laws.items() if name not in options},
-            }
-        return found
-
     # What a user would have written
 
-    def ranges(self, mode: str) -> tuple[list[tuple[sp.Expr, str]], list[tuple[sp.Expr, str]]]:
-        """Expressions of the parameters that must not be negative, each with the sentence for where it is; and those
-        that only what a fit tries may make so.
+    def ranges(self, mode: str) -> dict[str, list[tuple[sp.Expr, str]]]:
+        """``ranges``, expressions of the parameters that must not be negative, each with the sentence for where it is,
+        and ``limits``, those that may be where a fit tries it.
 
         Where one is with the parameters as they are given, the sentence is raised."""
-        known, found, limits = set(self.symbols.p.values()), list[Any](), list[Any]()
+        known, found = set(self.symbols.p.values()), {"ranges": list[Any](), "limits": list[Any]()}
         for k in range(len(self.parts)):
             here = self.place(k, mode, (0,) * len(self.parts))
             rows = [(sp.sympify(e), text) for e, text in here.element.ranges(here)]
             given = [(sp.sympify(e), text) for e, text in here.element.limits(here)]
-            for kept_to, of in ((found, rows), (limits, given)):
+            for kept_to, of in ((found["ranges"], rows), (found["limits"], given)):
                 kept_to += [(e, text) for e, text in of if e.free_symbols and e.free_symbols <= known]
-            at = [(sp.sympify(sp.sympify(e).xreplace(self.values)), text) for e, text in (*given, here.effect())]
+            read = isinstance(here.element.given, str)  # of a text: it was given before, at other values maybe
+            at = (
+                []
+                if read
+                else [(sp.sympify(sp.sympify(e).xreplace(self.values)), t) for e, t in (*given, here.effect())]
+            )
             for e, sentence in (*rows, *at):
                 if e.is_number and e < 0:
                     raise SystemDefinitionError(sentence)
-        return found, limits
+        return found
 
     def condition(self, rows: Sequence[Condition], owner: str) -> str:
         """The text of a condition; its expressions become indicators, equal ones of an element the same."""

@@ -25,7 +25,8 @@ from nonsmooth.system.units import Unit, product, read_unit, unit_of, write_unit
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """An element: its kind, how it was given, where it is, its rate, and what a unit force adds to states' derivatives.
+    """An element: its kind, how it was given, where it is, its rate, what a unit force adds to states' derivatives, its
+    laws (of the speed's magnitude in ``SPEED``), and what else was given, names of parameters and elements among it.
 
     ``rate`` is None where it has no meaning: where forces change its place at once, or where it differs between the
     modes of the system without elements."""
@@ -36,6 +37,8 @@ class Load:
     where: sp.Expr
     rate: sp.Expr | None
     direction: Mapping[int, sp.Expr]
+    laws: Mapping[str, sp.Expr]
+    options: Mapping[str, Any]
 
     @property
     def rubs(self) -> str:
@@ -97,6 +100,9 @@ def loads_of(make: Expressions) -> Loads:
     """The loads of elements that are put together by expressions."""
     modes, found = list(make.fields), []
     for k, part in enumerate(make.parts):
+        element = part.element
+        laws = [name for name in element.laws if not isinstance(getattr(element, name), str | None)]
+        apart = {"at", "on", element.kinematics, "position", "belt", *laws}
         try:
             rates = {sp.expand(make.rate(k, mode)) for mode in modes}
         except SystemDefinitionError:  # a force changes its place at once
@@ -104,11 +110,13 @@ def loads_of(make: Expressions) -> Loads:
         found.append(
             Load(
                 part.name,
-                type(part.element).__name__,
+                type(element).__name__,
                 _text(make, k),
                 part.where,
                 rates.pop() if len(rates) == 1 else None,
                 part.direction,
+                {name: make.spoken(k, name) for name in laws},
+                {one.name: getattr(element, one.name) for one in fields(element) if one.name not in apart},
             )
         )
     return Loads(tuple(found), {mode: tuple(make.fields[mode]) for mode in modes})
@@ -118,9 +126,11 @@ def _text(make: Expressions, k: int) -> str:
     """An element as it was given; functions as what they return."""
     part = make.parts[k]
     given = part.element.given or part.element
-    names = {make.symbols.t: "t"}
-    for symbols in (make.symbols.u, make.symbols.p, make.symbols.m):
-        names |= {symbol: name for name, symbol in symbols.items()}
+    if isinstance(given, str):
+        return given
+    symbols = make.symbols
+    names = {symbol: name for name, symbol in {**symbols.u, **symbols.p, **symbols.m}.items()}
+    names |= {symbols.t: "t", SPEED: "v"}
 
     def shown(name: str, value: Any) -> str:
         if isinstance(value, Mapping):
@@ -128,7 +138,7 @@ def _text(make: Expressions, k: int) -> str:
         if not callable(value):
             return f'"{value}"' if isinstance(value, str) else str(value)
         expression = make.spoken(k, name) if name in given.laws else make._given(value, name)
-        return write_expression(expression, {**names, SPEED: "v"})
+        return write_expression(expression, names)
 
     parts = [
         f"{one.name}={shown(one.name, getattr(given, one.name))}"

@@ -17,6 +17,8 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.arguments import checked
+from nonsmooth.system.symbolic.scalar import Scalar
+from nonsmooth.system.symbolic.tracing import call_scalar, call_vector
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition, condition_text, read_condition
 
@@ -233,21 +235,14 @@ def _coordinate(state: str) -> Callable[..., Any]:
 
 def _image(branch: Branch, states: Sequence[str], what: str) -> Callable[..., Any]:
     """The branch as a reset."""
-    from nonsmooth.system.symbolic.scalar import Scalar
-    from nonsmooth.system.symbolic.tracing import call_vector
-
     return lambda t, u, p: [Scalar(entry) for entry in call_vector(branch.function, (u, p), states, what)]
 
 
 def _number(function: Any, what: str) -> Callable[..., Any]:
     """A function of (u, p) with one value as one of (t, u, p)."""
-    from nonsmooth.system.symbolic.scalar import Scalar
-    from nonsmooth.system.symbolic.tracing import call_scalar
-
     return lambda t, u, p: Scalar(call_scalar(function, (u, p), what))
 
 
 def _output(key: str, given: Any) -> Any:
-    if isinstance(given, (tuple, list)) and len(given) == 2:
-        return _number(given[0], f"output {key!r}"), given[1]
-    return _number(given, f"output {key!r}")
+    function, unit = given if isinstance(given, (tuple, list)) and len(given) == 2 else (given, "")
+    return _number(function, f"output {key!r}"), unit

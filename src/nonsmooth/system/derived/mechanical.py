@@ -13,12 +13,10 @@ from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.combinations import element_names
 from nonsmooth.system.derived.elements import Element
-from nonsmooth.system.derived.loads import Loads
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.symbolic.tracing import Symbols, call
 from nonsmooth.system.system import System
 from nonsmooth.system.units import product, read_unit, unit_of, write_unit
-from nonsmooth.system.variant import variant_of
 
 
 @checked(read=False)
@@ -102,8 +100,7 @@ def mechanical(
         if key not in names:
             raise SystemDefinitionError(f"forcing: {unknown(key, 'a coordinate', repr(name), names)}")
 
-    forces = {key: _function(one, f"forcing of {key!r}") for key, one in (forcing or {}).items()}
-    rides = _function(0.0 if base is None else base, "base, an acceleration,")
+    forces = forcing or {}
     found: list[tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp.Matrix]] = []
 
     def matrices(p: Any) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp.Matrix]:
@@ -115,8 +112,8 @@ def mechanical(
 
     def outside(t: Any, p: Any) -> tuple[sp.Matrix, sp.Expr]:
         """Forcing of each coordinate, acceleration of the base."""
-        loads = [to_expression(forces[key](t, p)) if key in forces else sp.Integer(0) for key in names]
-        return sp.Matrix(loads), to_expression(rides(t, p))
+        loads = [to_expression(_value(forces.get(key, 0), (t, p), f"forcing of {key!r}")) for key in names]
+        return sp.Matrix(loads), to_expression(_value(0 if base is None else base, (t, p), "base, an acceleration,"))
 
     def field(t: Any, u: Any, p: Any) -> list[Any]:
         inverse, damping, stiffness, _ = matrices(p)
@@ -154,15 +151,10 @@ def mechanical(
     units_of = {symbol: read_unit(unit) for symbol, unit in d.symbol_units.items()}
     energies = (product(unit_of(mass[i, i], units_of), *2 * [units_of[d.traced.u[size + i]]]) for i in range(size))
     energy = next((one for one in energies if one is not None), None)
-    loads = d.loads or Loads((), {"all": d.traced.fields[0]})
     positive = [(mass[i, i], f"the mass of coordinate {key!r} must be positive") for i, key in enumerate(names)]
     positive += [(one, "the mass matrix must be positive definite") for one in _pivots(mass)]
     positive = [one for one in positive if one[0].free_symbols]
-    new = d.with_loads(replace(loads, powers=powers, energy=write_unit(energy)))
-    if positive:
-        new = replace(new, ranges=(*positive, *d.ranges), variants={})
-        return System._make(new, dict(system.values), variant_of(new))
-    return System._make(new, dict(system.values), system._variant)
+    return system._of(d.refined(powers, write_unit(energy), [*positive, *d.ranges] if positive else ()))
 
 
 def _powers(
@@ -186,11 +178,11 @@ def _powers(
     return {key: power[0, 0] for key, power in powers.items() if key in ("forcing", "damping") or power[0, 0] != 0}
 
 
-def _function(given: Any, what: str) -> Callable[..., Any]:
-    """A load as a function of time and parameters; it may be a number or the name of a parameter."""
-    if not callable(given):
-        return lambda t, p: p[given] if isinstance(given, str) else given
-    return lambda t, p: call(given, (t, p), what)
+def _value(given: Any, arguments: tuple[Any, ...], what: str) -> Any:
+    """The value of a number, of the name of a parameter, or of a function of ``arguments``, the last being those."""
+    if callable(given):
+        return call(given, arguments, what)
+    return arguments[-1][given] if isinstance(given, str) else given
 
 
 def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any], sp.Matrix], system: str) -> Any:
@@ -214,7 +206,9 @@ def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any],
         return sum(Scalar(weight) * entries[i] for i, weight in places.items())
 
     def own(t: Any, u: Any, p: Any) -> Any:
-        return element.placed(along(u[: len(names)]), along(u[len(names) :]), lambda given: _law(given, t, u, p))
+        return element.placed(
+            along(u[: len(names)]), along(u[len(names) :]), lambda given: _value(given, (t, u, p), "a function of its")
+        )
 
     def acts(i: int) -> Callable[..., Any]:
         def into(t: Any, u: Any, p: Any) -> Any:
@@ -227,12 +221,6 @@ def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any],
     placed = replace(element, at=None, on=on, **{element.kinematics: own})
     object.__setattr__(placed, "given", element)
     return placed
-
-
-def _law(given: Any, t: Any, u: Any, p: Any) -> Any:
-    if callable(given):
-        return call(given, (t, u, p), "a function of its")
-    return p[given] if isinstance(given, str) else given
 
 
 def _inverse(mass: sp.Matrix, system: str) -> sp.Matrix:
@@ -272,9 +260,7 @@ def _between(names: list[str]) -> str:
 
 
 def _size(M: Any) -> int:
-    if callable(M):
-        return _size(call(M, (_Any(),), "M"))
-    found = np.asarray(M.toarray() if hasattr(M, "toarray") else M, dtype=object)
+    found = _array(M, _Any(), "M")
     if found.ndim == 0:
         return 1
     if found.ndim != 2 or found.shape[0] != found.shape[1] or not found.size:
@@ -303,9 +289,14 @@ def _coordinates(given: Any, size: int) -> list[str]:
     return names
 
 
+def _array(given: Any, p: Any, what: str) -> np.ndarray:
+    """A matrix that is an array, one of SciPy, or a function of parameters, with its entries as they are."""
+    found = call(given, (p,), what) if callable(given) else given
+    return np.asarray(found.toarray() if hasattr(found, "toarray") else found, dtype=object)
+
+
 def _matrix(given: Any, p: Any, size: int, what: str) -> sp.Matrix:
-    found = call(given, (p,), what) if callable(given) else given.toarray() if hasattr(given, "toarray") else given
-    array = np.asarray(found, dtype=object)
+    array = found = _array(given, p, what)
     if array.ndim == 0:
         array = array.reshape(1, 1)
     if array.shape != (size, size):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 STEP = 1e-30  # of the imaginary parts that carry derivatives: its square is nothing
 
-Armed = tuple[tuple[int, int, int], ...]  # indicator, sign, strict of each condition
+Conditions = tuple[TracedCondition, ...]
 
 
 class Out(NamedTuple):
@@ -41,7 +41,7 @@ class Out(NamedTuple):
     element: int
     way: int
     leaving: Leaving
-    rows: Armed
+    rows: Conditions
 
 
 class Reset(NamedTuple):
@@ -60,7 +60,7 @@ class Lead(NamedTuple):
     source: Pattern
     target: Pattern
     element: str
-    rows: Armed
+    rows: Conditions
     kind: str
     change: Reset | None = None
 
@@ -107,7 +107,7 @@ class Patterns:
     def labels(self) -> list[str]:
         """A name for each of the expressions, for messages."""
         sides = {None: "", 1: "_forward", -1: "_back", 0: "_still"}
-        names, parts = self.make.names, self.make.parts
+        names, parts = list(self.make.symbols.u), self.make.parts
         return [
             f"{parts[k].name}_{what}" + (f"_{names[i]}" if what == "on" and i is not None else sides[i])
             for k, what, i in self.at
@@ -121,15 +121,15 @@ class Patterns:
     @cached_property
     def conditions(self) -> tuple[str, ...]:
         """Names of the conditions of all elements, the indicators of the system."""
-        return tuple(name for names in self._conditions.values() for name in names)
+        return tuple(name for name, _ in self._owned)
 
     @cached_property
-    def _conditions(self) -> dict[int, list[str]]:
-        """The names of the conditions of each element."""
-        make, found = self.make, {}
+    def _owned(self) -> list[tuple[str, int]]:
+        """The names of all conditions, each with its element."""
+        make, found = self.make, []
         for k, (name, element) in enumerate(self.elements.items()):
             thrown = THROWN if element.held and make.driven(make.rate(k, self.mode)) else ()
-            found[k] = [f"{name}_{one}" for one in (*element.conditions, *thrown)]
+            found += [(f"{name}_{one}", k) for one in (*element.conditions, *thrown)]
         return found
 
     @cached_property
@@ -140,24 +140,24 @@ class Patterns:
     @cached_property
     def owners(self) -> list[int]:
         """The element of each condition."""
-        return [k for k, names in self._conditions.items() for _ in names]
+        return [k for _, k in self._owned]
 
-    def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], Armed]:
+    def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], Conditions]:
         """The ways of an element out of its phase in a pattern, the rows of its conditions by their numbers, and the
         conditions at which it meets what it may be held by."""
         key = k, rows.phases(k, pattern)
         if key in rows.ways:
-            found: tuple[list[Out], dict[int, FloatArray], Armed] = rows.ways[key]
+            found: tuple[list[Out], dict[int, FloatArray], Conditions] = rows.ways[key]
             return found
         name, conditions = rows.parts[k].name, {}
 
-        def armed(some: Sequence[Any]) -> Armed:
+        def armed(some: Sequence[Any]) -> Conditions:
             found = []
             for one in some:
                 own = f"{name}_{one.name}"
                 slot = self.slots[own if own in self.slots else one.name]
                 conditions[slot] = one.value.values
-                found.append((slot, one.sign, int(one.strict)))
+                found.append(TracedCondition(slot, one.sign, one.strict))
             return tuple(found)
 
         leaving = enumerate(rows.leaving(k, self.mode, pattern))
@@ -167,13 +167,13 @@ class Patterns:
         rows.ways[key] = outs, conditions, armed([way[0] for way in ways])
         return outs, conditions, rows.ways[key][2]
 
-    def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], Armed]:
+    def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], Conditions]:
         """The rows (conditions, M) of a pattern, NaN where one is not asked for; the ways out; the conditions at which
         elements meet what they may be held by."""
         every = np.zeros((len(self.slots), rows.field.shape[1]), dtype=rows.field.dtype)
         every[:, rows.n] = np.nan
         found: list[Out] = []
-        meets: Armed = ()
+        meets: Conditions = ()
         for k in range(len(rows.parts)):
             outs, conditions, met = self.ways_of(rows, pattern, k)
             found += outs
@@ -218,13 +218,7 @@ class Patterns:
             period = call_scalar(period, (symbols.parameters(),), "`period`")
         self.equations = Traced(
             name="",
-            t=symbols.t,
-            u=self.make.u,
-            p=tuple(symbols.p.values()),
-            m=(),
-            state_names=tuple(symbols.u),
-            parameter_names=tuple(symbols.p),
-            memory_names=(),
+            **symbols.of_traced(),
             mode_names=(self.mode,),
             indicator_names=tuple(self.labels),
             output_names=(),
@@ -291,13 +285,10 @@ class Patterns:
         with self._lock:
             if lead not in self._jumped:
                 names = self.name(lead.source), self.name(lead.target)
-                conditions = tuple(
-                    TracedCondition(indicator, sign, bool(strict)) for indicator, sign, strict in lead.rows
-                )
                 self._jumped[lead] = len(self.jumps)
                 label = lead.element if lead.kind in ENDS else " -> ".join(names)
                 contact = self.begins_contact(lead)
-                self.jumps.append(TracedTransition(*ends, conditions, contact=contact, label=label, kind=lead.kind))
+                self.jumps.append(TracedTransition(*ends, lead.rows, contact=contact, label=label, kind=lead.kind))
                 self.changes.append(lead.change)
             return self._jumped[lead]
 
@@ -322,7 +313,7 @@ class Patterns:
     def retold(self, source: Any, target: Any, element: str, rows: Any, kind: str, change: Any) -> int:
         """The number of a transition that was told."""
         ends = [self.visited[self.retold_mode(phases)] for phases in (source, target)]
-        given = tuple((int(i), int(sign), int(strict)) for i, sign, strict in rows)
+        given = tuple(TracedCondition(int(i), int(sign), bool(strict)) for i, sign, strict in rows)
         change = change and Reset(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
         return self.transition(Lead(ends[0], ends[1], str(element), given, str(kind), change))
 
@@ -349,18 +340,15 @@ class Patterns:
     def seen(self) -> Traced:
         """The equations as far as they are known: names and transitions of the patterns visited; what elements add has
         no expressions."""
-        size = len(self.visited), len(self.jumps)
-        if self._seen[0] != size:
-            self._seen = size, self._as_seen(*size)
-        return self._seen[1]
-
-    def _as_seen(self, count: int, jumps: int) -> Traced:
+        size = count, jumps = len(self.visited), len(self.jumps)
+        if self._seen[0] == size:
+            return self._seen[1]
         traced, unknown = self.equations, sp.nan
         names = (*traced.output_names, *self.outputs)
         acted = {i for some in self.acts_on for i in some}
         field = tuple(unknown if i in acted else e for i, e in enumerate(traced.fields[0]))
         own = tuple((output[0],) * count for output in traced.outputs)
-        return replace(
+        seen = replace(
             traced,
             patterns=self,
             mode_names=tuple(map(self.name, self.visited[:count])),
@@ -372,6 +360,8 @@ class Patterns:
             fields=(field,) * count,
             lacking=(traced.lacking[0],) * count,
         )
+        self._seen = size, seen
+        return seen
 
     def forces(self, parameters: FloatArray, time: FloatArray, u: FloatArray, mode: Any) -> FloatArray:
         """Forces (N, elements) at N samples, each in the pattern of its mode."""

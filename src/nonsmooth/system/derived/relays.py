@@ -22,6 +22,7 @@ import sympy as sp
 from nonsmooth.system.derived.elements import Coulomb, Element, PreloadedSpring
 from nonsmooth.system.derived.elements.element import CREEP
 from nonsmooth.system.symbolic.scalar import Scalar
+from nonsmooth.system.symbolic.traced import along
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
 from nonsmooth.system.transition import Mode, Surface
 
@@ -41,7 +42,7 @@ class Relays:
     """The field between all surfaces, the relays by their indicators, the user's mode for each choice of signs, and
     what must not be negative for relays to push towards their surfaces, each with its sentence."""
 
-    field: Any
+    field: Mode
     elements: Mapping[str, Element]
     modes: Mapping[Signs, str]
     ranges: Sequence[tuple[sp.Expr, str]] = ()
@@ -66,17 +67,17 @@ def relays_of(symbols: Symbols, given: Mapping[str, Any], values: Mapping[sp.Sym
         return None
     if any(item.static is not None or item.field is not None or item.mode for item in transitions):
         return None
-    tables = (one[0] if isinstance(one, (tuple, list)) else one for one in given["outputs"].values())
-    if any(isinstance(mode, Mode) for mode in modes.values()) or any(isinstance(one, Mapping) for one in tables):
+    tables = (function for function, _ in given["outputs"].values())
+    if any(mode.states for mode in modes.values()) or any(isinstance(one, Mapping) for one in tables):
         return None
     keys = list(dict.fromkeys(item.indicator for item in transitions))
     signs = _signs(keys, modes, transitions)
     if signs is None or any(key not in where for key in keys):
         return None
-    arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
+    arguments = symbols.arguments()
     u = tuple(symbols.u.values())
     fields = {
-        sides: call_vector(modes[mode], arguments, tuple(symbols.u), f"the vector field of mode {mode!r}")
+        sides: call_vector(modes[mode].field, arguments, tuple(symbols.u), f"the vector field of mode {mode!r}")
         for sides, mode in signs.items()
     }
     middle = tuple(sp.expand(sp.Add(*column) / len(fields)) for column in zip(*fields.values(), strict=True))
@@ -95,8 +96,7 @@ def relays_of(symbols: Symbols, given: Mapping[str, Any], values: Mapping[sp.Sym
     ranges: list[tuple[sp.Expr, str]] = []
     for key, b in zip(keys, pushes, strict=True):
         h = call_scalar(where[key], arguments, f"indicator {key!r}")
-        slopes = [sp.diff(h, symbol) for symbol in u]
-        rate = sp.diff(h, symbols.t) + sum(s * f for s, f in zip(slopes, middle, strict=True))
+        rate = along(h, symbols.t, u, middle)
         first, second = (
             sp.simplify(sum(sp.diff(e, symbol) * part for symbol, part in zip(u, b, strict=True))) for e in (h, rate)
         )
@@ -118,7 +118,7 @@ def relays_of(symbols: Symbols, given: Mapping[str, Any], values: Mapping[sp.Sym
     if 2 not in degrees:
         return None
     entries = [Scalar(sp.sympify(e)) for e in middle]
-    return Relays(lambda t, u, p: entries, elements, signs, ranges)
+    return Relays(Mode(lambda t, u, p: entries), elements, signs, ranges)
 
 
 def _signs(keys: Sequence[str], modes: Mapping[str, Any], surfaces: Sequence[Surface]) -> dict[Signs, str] | None:

@@ -159,17 +159,13 @@ class Rows(Assembler):
     def basis(self, held: tuple[int, ...], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
         chosen, sums = super().basis(held, mode, pattern)
         if len(chosen) < len(held) and self.field.dtype == complex:
-            self._refuse_varying(chosen, held, sums, pattern)
+            ways, some = (
+                np.array([self.pushing(k, self.mode, pattern).direction for k in which]) for which in (held, chosen)
+            )
+            if np.abs((ways - sums @ some).imag).max() > 1e-9 * np.abs(ways.imag).max(initial=0.0):
+                names = ", ".join(repr(self.parts[k].name) for k in held)
+                raise VaryingError(names, "a parameter in which derivatives are asked for")
         return chosen, sums
-
-    def _refuse_varying(self, chosen: list[int], held: Sequence[int], sums: FloatArray, pattern: Pattern) -> None:
-        """Raise where the sums of forces that hold together depend on the parameter of the derivatives."""
-        ways, some = (
-            np.array([self.pushing(k, self.mode, pattern).direction for k in which]) for which in (held, chosen)
-        )
-        if np.abs((ways - sums @ some).imag).max() > 1e-9 * np.abs(ways.imag).max(initial=0.0):
-            names = ", ".join(repr(self.parts[k].name) for k in held)
-            raise VaryingError(names, "a parameter in which derivatives are asked for")
 
     def identity(self) -> FloatArray:
         return np.eye(self.n, self.field.shape[1])

@@ -26,7 +26,7 @@ places of the two modes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.derived.sticking import Additions
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.symbolic.scalar import as_written
-from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Traced, TracedCondition, TracedTransition
+from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Traced, TracedCondition, TracedTransition, along
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -50,41 +50,16 @@ SEEDS = 3  # random points at which the orders of two surfaces are compared
 Field = tuple[sp.Expr, ...]
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """A surface between two modes, which may slide along other surfaces themselves."""
-
-    indicator: int
-    below: int
-    above: int
-    mode: str  # "": named after its indicators
-    static: sp.Expr | None = None
-    field: Field | None = None
-
-
 def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str, float]) -> Traced:
-    """Return the system with its sliding modes and, at each surface, the transitions between below, above and sliding.
-
-    Parameters
-    ----------
-    traced : Traced
-        With two plain transitions for each surface, one each way; they are replaced.
-    surfaces : sequence of TracedSurface
-    scale : mapping of state to float
-
-    Raises
-    ------
-    SystemDefinitionError
-        A transition that the two modes of a surface have with different resets or targets.
-    """
+    """Return the system with its sliding modes and, at each surface, the transitions between below, above and sliding,
+    in place of the two plain ones, one each way."""
     build = _SlidingModes(traced, scale)
-    declared = [_Pair(s.indicator, s.below, s.above, s.mode, s.static, s.field) for s in surfaces]
-    pairs, level = list(declared), declared
+    pairs, level = list(surfaces), list(surfaces)
     while level:
         build.add_modes(level)
         level = [pair for pair in dict.fromkeys(build.meetings(pairs)) if pair not in pairs]
         pairs += level
-    build.inherit(declared)
+    build.inherit(surfaces)
     for pair in pairs:
         build.add_transitions(pair)
     return build.put_in(lacking=tuple(build.lacking), along=tuple(build.along))
@@ -94,21 +69,14 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
 def _both_rates(traced: Traced, surface: TracedSurface, scale: tuple[float, ...]) -> Callable[..., Any]:
     """Function of t, u, m, p: the indicator, its size, its rates below and above."""
     build = _SlidingModes(traced, dict(zip(traced.state_names, scale, strict=True)))
-    pair = _Pair(surface.indicator, surface.below, surface.above, surface.mode)
-    rates = (build.rate(pair, mode) for mode in (pair.below, pair.above))
-    found = [traced.indicators[pair.indicator], build.size(pair), *rates]
+    rates = (build.rate(surface, mode) for mode in (surface.below, surface.above))
+    found = [traced.indicators[surface.indicator], build.size(surface), *rates]
     return sp.lambdify([traced.t, list(traced.u), list(traced.m), list(traced.p)], found, modules="numpy")
 
 
 def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
-    """Return the surface on which a start lies where both fields point away from it, and which start; else None.
-
-    Parameters
-    ----------
-    system : System
-    states : array (S, n)
-        Starts at t = 0.
-    """
+    """Return the surface on which one of the starts (S, n) lies at t = 0, both fields pointing away from it, and which
+    start; else None."""
     traced, scale = system.declared, tuple(system.scale.values())
     for surface in system.surfaces:
         both = _both_rates(traced, surface, scale)
@@ -130,19 +98,19 @@ class _SlidingModes(Additions):
         self.moving = {traced.t, *traced.u, *traced.m}
         self.kappa = sp.Integer(1) if traced.period is None else 2 * sp.pi / traced.period
         self.lacking = list(traced.lacking)
-        self.sliding: dict[_Pair, int] = {}  # the mode in which motion slides along a surface; none where it cannot
+        self.sliding: dict[
+            TracedSurface, int
+        ] = {}  # the mode in which motion slides along a surface; none where it cannot
         self.cells = [frozenset({mode}) for mode in range(len(self.modes))]  # declared modes that meet in each mode
         self.along = [frozenset[int]() for _ in self.modes]  # the indicators that each mode keeps at zero
 
     # Expressions
 
-    def rate(self, pair: _Pair, mode: int) -> sp.Expr:
+    def rate(self, pair: TracedSurface, mode: int) -> sp.Expr:
         """Lie derivative of the pair's indicator in a mode."""
-        h = self.indicators[pair.indicator]
-        flow = sum(h.diff(u) * f for u, f in zip(self.traced.u, self.fields[mode], strict=True))
-        return sp.expand(h.diff(self.traced.t) + flow)
+        return sp.expand(along(self.indicators[pair.indicator], self.traced.t, self.traced.u, self.fields[mode]))
 
-    def at_surface(self, pair: _Pair, expression: sp.Expr) -> sp.Expr:
+    def at_surface(self, pair: TracedSurface, expression: sp.Expr) -> sp.Expr:
         """The expression without a state that the surface determines: a field may have no value far beyond it."""
         h = self.indicators[pair.indicator]
         slopes = {u: sp.expand(h.diff(u)) for u in self.traced.u}
@@ -152,7 +120,7 @@ class _SlidingModes(Additions):
         u = min(usable, key=lambda u: len(slopes[u].free_symbols))
         return sp.expand(expression.subs(u, sp.expand(u - h / slopes[u])))
 
-    def size(self, pair: _Pair) -> sp.Expr:
+    def size(self, pair: TracedSurface) -> sp.Expr:
         """Typical size of the indicator, from the states' scales."""
         h, at = self.indicators[pair.indicator], dict(zip(self.traced.u, self.scale, strict=True))
         at |= {self.traced.t: sp.Integer(0)}
@@ -165,7 +133,7 @@ class _SlidingModes(Additions):
         quotient = a / b
         return sp.cancel(quotient) if quotient.free_symbols & self.moving else quotient
 
-    def direction(self, pair: _Pair) -> tuple[Field, sp.Expr, sp.Expr] | None:
+    def direction(self, pair: TracedSurface) -> tuple[Field, sp.Expr, sp.Expr] | None:
         """(e, h_u e, length) of the difference of both fields, length * e with e constant; None where it turns."""
         below, above = self.fields[pair.below], self.fields[pair.above]
         d = [sp.expand(a - b) for a, b in zip(above, below, strict=True)]
@@ -178,12 +146,12 @@ class _SlidingModes(Additions):
 
     # Modes
 
-    def add_modes(self, pairs: Sequence[_Pair]) -> None:
+    def add_modes(self, pairs: Sequence[TracedSurface]) -> None:
         """Add the modes in which motion slides along the surfaces of pairs, where their fields differ in crossing them.
 
         Sliding along the same surfaces in another order is the same mode; where the order matters there is none.
         """
-        found: dict[tuple[frozenset[int], frozenset[int]], list[tuple[_Pair, Field, list[sp.Expr]]]] = {}
+        found: dict[tuple[frozenset[int], frozenset[int]], list[tuple[TracedSurface, Field, list[sp.Expr]]]] = {}
         for pair in pairs:
             below, above = self.rate(pair, pair.below), self.rate(pair, pair.above)
             if sp.expand(below - above) == 0:
@@ -193,23 +161,20 @@ class _SlidingModes(Additions):
             if pair.field is not None:
                 field = self._given(pair, pair.field)
             found.setdefault(key, []).append((pair, field, shown))
-        for (cell, along), ways in found.items():
+        for (cell, held), ways in found.items():
             first, field, shown = ways[0]
             if not all(_agree(field, other) for _, other, _ in ways[1:]):
                 continue
-            name = first.mode or "_".join(self.indicator_names[i] for i in sorted(along)) + "_sliding"
+            name = first.mode or "_".join(self.indicator_names[i] for i in sorted(held)) + "_sliding"
             if name in self.modes:
                 name += "".join(f"_{self.modes[mode]}" for mode in sorted(cell))
             self.sliding |= {pair: len(self.modes) for pair, _, _ in ways}
-            self.modes.append(name)
-            self.fields.append(field)
+            self.mode(name, field, shown)
             self.lacking.append(self.lacking[first.below])
             self.cells.append(cell)
-            self.along.append(along)
-            for row, entry in zip(self.outputs, shown, strict=True):
-                row.append(entry)
+            self.along.append(held)
 
-    def _filippov(self, pair: _Pair, below: sp.Expr, above: sp.Expr) -> tuple[Field, list[sp.Expr]]:
+    def _filippov(self, pair: TracedSurface, below: sp.Expr, above: sp.Expr) -> tuple[Field, list[sp.Expr]]:
         """The convex combination that stays on the surface: vector field, outputs."""
         first, second = self.fields[pair.below], self.fields[pair.above]
         ends = [(row[pair.below], row[pair.above]) for row in self.outputs]
@@ -221,16 +186,16 @@ class _SlidingModes(Additions):
             return field, [x if x == y else x + b * (y - x) for x, y in ends]
         e, slope, length = found
         field = tuple(
-            x if along == 0 else sp.expand(x - along * (below + off) / slope) for x, along in zip(first, e, strict=True)
+            x if way == 0 else sp.expand(x - way * (below + off) / slope) for x, way in zip(first, e, strict=True)
         )
         shown = [x if x == y else sp.expand(x - self.ratio(y - x, length) * below / slope) for x, y in ends]
         return field, shown
 
-    def _given(self, pair: _Pair, given: Field) -> Field:
+    def _given(self, pair: TracedSurface, given: Field) -> Field:
         """The field that was given for the surface, with the same decay beside it."""
         h = self.indicators[pair.indicator]
         slopes = [h.diff(u) for u in self.traced.u]
-        rate = sp.expand(h.diff(self.traced.t) + sum(s * f for s, f in zip(slopes, given, strict=True)))
+        rate = sp.expand(along(h, self.traced.t, self.traced.u, given))
         remainder = sp.simplify(self.at_surface(pair, rate))
         if remainder != 0 and sp.fraction(sp.cancel(rate / h))[1].free_symbols & self.moving:
             raise SystemDefinitionError(
@@ -242,7 +207,7 @@ class _SlidingModes(Additions):
         off = self.kappa * h
         return tuple(f if s == 0 else f - off * s / norm for f, s in zip(given, slopes, strict=True))
 
-    def meetings(self, pairs: Sequence[_Pair]) -> Iterator[_Pair]:
+    def meetings(self, pairs: Sequence[TracedSurface]) -> Iterator[TracedSurface]:
         """Surfaces between two sliding modes: where both sides of one surface slide along another."""
         known = {(pair.indicator, pair.below, pair.above): pair for pair in pairs}
         slid = [pair for pair in pairs if pair in self.sliding]
@@ -257,11 +222,11 @@ class _SlidingModes(Additions):
                         continue
                     ends = self.sliding[one], self.sliding[two]
                     if (other.indicator, *ends) not in known and ends[0] != ends[1]:
-                        yield _Pair(other.indicator, *ends, "", other.static)
+                        yield TracedSurface(other.indicator, *ends, "", other.static)
 
     # Transitions
 
-    def add_transitions(self, pair: _Pair) -> None:
+    def add_transitions(self, pair: TracedSurface) -> None:
         """Add the transitions between below, above and sliding."""
         h, name = pair.indicator, self.indicator_names[pair.indicator]
         size, value = self.size(pair), BEYOND * self.indicators[pair.indicator]
@@ -296,26 +261,23 @@ class _SlidingModes(Additions):
         if slid is not None and attraction.free_symbols & self.moving:
             least = self.size(pair) * self.kappa / BEYOND
             gone = TracedCondition(
-                self.indicator(attraction - least, f"{name} attraction between {self._names(mode)}"), -1
+                self.indicator(
+                    attraction - least, f"{name} attraction between {self.modes[mode[-1]]} and {self.modes[mode[1]]}"
+                ),
+                -1,
             )
             self.jump(slid, self.undetermined(slid), gone)
-
-    def _names(self, mode: Mapping[int, int]) -> str:
-        return f"{self.modes[mode[-1]]} and {self.modes[mode[1]]}"
 
     def undetermined(self, slid: int) -> int:
         """The mode that says that motion is not unique behind the end of a sliding mode."""
         name = self.modes[slid] + NOT_UNIQUE
         if name not in self.modes:
-            self.modes.append(name)
-            self.fields.append(self.fields[slid])
+            self.mode(name, self.fields[slid], [row[slid] for row in self.outputs])
             self.lacking.append(self.lacking[slid])
             self.along.append(self.along[slid])
-            for row in self.outputs:
-                row.append(row[slid])
         return self.modes.index(name)
 
-    def inherit(self, pairs: Sequence[_Pair]) -> None:
+    def inherit(self, pairs: Sequence[TracedSurface]) -> None:
         """Keep the transitions of the declared system and give the sliding modes those of the modes that meet there."""
         surfaces = {(pair.below, pair.above, TracedCondition(pair.indicator, 1)) for pair in pairs}
         surfaces |= {(pair.above, pair.below, TracedCondition(pair.indicator, -1)) for pair in pairs}

@@ -10,6 +10,9 @@ are a true partition; a tie of two rows belongs to the first (with c_s = 0 in th
 two rows are equal everywhere, hence the non-strict rows). The band's half width is a parameter of the
 derived system, so that a change of it compiles nothing.
 
+Pairs over other surfaces follow in turn. What led from P and from Q across another surface leads from band to band, so
+that bands that cross are smoothed like modes, and each element does its part there.
+
 That is the linear band. With q = (1 + tanh(g_r / eta)) / 2 the band is `REACH` half widths wide, where q is 0 or 1 to
 rounding. With q = 1/2 + arctan(g_r / eta) / pi it has no end: one field, the mean of all weighted with products of the
 q, holds in every mode, and the declared transitions only say on which side the state is.
@@ -20,7 +23,7 @@ of the two fields in the band.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -54,15 +57,24 @@ class _ModePair:
     outer: int  # P
     inner: int  # Q, where all rows hold
     rows: tuple[TracedCondition, ...]
+    contact: tuple[bool, bool]  # whether one begins where Q is entered, and where P is
+
+    @property
+    def ways(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Each mode, and that on the other side."""
+        return (self.outer, self.inner), (self.inner, self.outer)
 
 
 def _label(traced: Traced, a: int, b: int) -> str:
-    return f"{traced.mode_names[a]!r} and {traced.mode_names[b]!r}"
+    return " and ".join(repr(traced.mode_names[mode]) for mode in sorted((a, b)))
 
 
-def _pairs(traced: Traced) -> list[_ModePair]:
-    """Group the transitions into pairs of modes, or say which pair cannot be smoothed."""
-    remaining = list(traced.transitions)
+def _pairs(traced: Traced, surface: Set[int] | None = None) -> list[_ModePair]:
+    """Group the transitions into pairs of modes, or say which pair cannot be smoothed; with ``surface``: those whose
+    rows are all of these indicators."""
+    remaining = [
+        jump for jump in traced.transitions if surface is None or all(row.indicator in surface for row in jump.rows)
+    ]
     if not remaining:
         raise SystemDefinitionError(f"{traced.name!r} has no transitions: there is nothing to smooth")
     pairs = []
@@ -83,13 +95,13 @@ def _pairs(traced: Traced) -> list[_ModePair]:
                 raise SystemDefinitionError(f"{what}: {jump.label} writes memory, at an instant a band does not have")
         if any(any(traced.lacking[mode]) for mode in (a, b)):
             raise SystemDefinitionError(f"{what}: a mode with fewer states has no field to interpolate")
-        pair = _oriented(a, b, both) or _oriented(b, a, both)
-        if pair is None:
+        ways = [way for way in (_oriented(a, b, both), _oriented(b, a, both)) if way is not None]
+        if not ways:
             raise SystemDefinitionError(
                 f"{what}: the smoothed switch needs one condition for one of the two modes and, for the way back, only "
                 f"transitions that each reverse one sign of it (hysteresis has no band)"
             )
-        pairs.append(pair)
+        pairs.append(max(ways, key=lambda way: way.rows[0].sign))  # of one row either will do
     return pairs
 
 
@@ -103,14 +115,7 @@ def _oriented(outer: int, inner: int, jumps: Sequence[TracedTransition]) -> _Mod
     for jump in leave:
         if len(jump.rows) != 1 or TracedCondition(jump.rows[0].indicator, -jump.rows[0].sign) not in rows:
             return None
-    return _ModePair(outer, inner, rows)
-
-
-def smoothed_indicators(description: Description) -> tuple[str, ...]:
-    """Names of the indicators that get a band, in order of their use."""
-    traced, _ = without_sticking(description.traced)
-    names = traced.indicator_names
-    return tuple(dict.fromkeys(names[row.indicator] for pair in _pairs(traced) for row in pair.rows))
+    return _ModePair(outer, inner, rows, (enter[0].contact, any(jump.contact for jump in leave)))
 
 
 class _Bands(Additions):
@@ -148,14 +153,14 @@ class _Bands(Additions):
             self.indicator(self.traced.indicators[row.indicator] + shift * eta, label), row.sign * upward
         )
 
-    def least(self, pair: _ModePair, r: int) -> tuple[TracedCondition, ...]:
-        """Rows saying that row r of the pair is the least; ties go to the first."""
+    def least(self, rows: tuple[TracedCondition, ...], r: int) -> tuple[TracedCondition, ...]:
+        """Rows saying that row r of these is the least; ties go to the first."""
         found = []
-        for s in range(len(pair.rows)):
+        for s in range(len(rows)):
             if s == r:
                 continue
             first, second = (r, s) if r < s else (s, r)
-            a, b = pair.rows[first], pair.rows[second]
+            a, b = rows[first], rows[second]
             ratio = self.eta(a) / self.eta(b)
             names = self.traced.indicator_names
             label = f"{'' if a.sign > 0 else '-'}{names[a.indicator]} {'-' if b.sign > 0 else '+'} {names[b.indicator]}"
@@ -175,9 +180,12 @@ class _Bands(Additions):
         given = self.description.bands if self.shape == "linear" else ()
         own: TracedBand | None = next((band for band in given if band.indicator == row.indicator), None)
         writes = []
+
+        def mixed(a: sp.Expr, b: sp.Expr) -> sp.Expr:
+            return a if a == b else (1 - q) * a + q * b
+
         if own is None:
-            mixed = zip(self.traced.fields[pair.outer], self.traced.fields[pair.inner], strict=True)
-            field = tuple(a if a == b else (1 - q) * a + q * b for a, b in mixed)
+            field = tuple(map(mixed, self.traced.fields[pair.outer], self.traced.fields[pair.inner]))
         else:
             field = tuple(entry.subs(own.eta, eta) for entry in own.field)
             for key, unit, symbol, value in own.memory:
@@ -185,34 +193,48 @@ class _Bands(Additions):
                     self.m.append(symbol)
                     self.memory.append((key, unit))
                 writes.append((self.m.index(symbol), value.subs(own.eta, eta)))
-        for index, row_of in enumerate(self.outputs):
-            a, b = row_of[pair.outer], row_of[pair.inner]
-            if own is not None and index in own.outputs:
-                row_of.append(own.outputs[index].subs(own.eta, eta))
-            else:
-                row_of.append(a if a == b else (1 - q) * a + q * b)
-        self.modes.append(label)
-        self.fields.append(field)
+        shown = [mixed(row[pair.outer], row[pair.inner]) for row in self.outputs]
+        if own is not None:
+            for index, output in own.outputs.items():
+                shown[index] = output.subs(own.eta, eta)
+        self.mode(label, field, shown)
         return len(self.modes) - 1, tuple(writes)
 
-    def add(self, pair: _ModePair) -> None:
-        """Add the bands of a pair and the transitions over their borders."""
-        kept = [r for r, row in enumerate(pair.rows) if not self._repeats(pair, r)]
+    def add(self, pairs: Sequence[_ModePair]) -> None:
+        """Add the bands of pairs over one surface; what crosses another surface on both sides does so in the band."""
+        inside = [{pair.outer, pair.inner} for pair in pairs]
+        others = [jump for jump in self.traced.transitions if {jump.source, jump.target} not in inside]
+        bands = {(pair.outer, pair.inner): self.add_pair(pair) for pair in pairs}
+        self.jumps += others
+        leads = {(jump.source, jump.rows): jump.target for jump in others}
+        for (outer, inner), own in bands.items():
+            for jump in (jump for jump in others if jump.source == outer and (inner, jump.rows) in leads):
+                beyond = bands.get((jump.target, leads[inner, jump.rows]), ())
+                for source, target in zip(own, beyond, strict=False):
+                    self.jump(source, target, *jump.rows, contact=jump.contact)
+        lacking = ((False,) * len(self.traced.u),) * (len(self.modes) - len(self.traced.mode_names))
+        self.traced, self.jumps = self.put_in(lacking=self.traced.lacking + lacking), []
+
+    def add_pair(self, pair: _ModePair) -> list[int]:
+        """Add the bands of a pair, whose modes are returned, and the transitions over their borders."""
+        margins = [self.margin(row) for row in pair.rows]  # one that repeats another needs no band of its own
+        kept = [r for r, m in enumerate(margins) if all(sp.expand(m - before) != 0 for before in margins[:r])]
         bands = {r: self.band(pair, pair.rows[r]) for r in kept}
-        least = {
-            r: tuple(self.least(_ModePair(0, 0, tuple(pair.rows[s] for s in kept)), k)) for k, r in enumerate(kept)
-        }
+        least = {r: self.least(tuple(pair.rows[s] for s in kept), k) for k, r in enumerate(kept)}
         # Between bands first: after a change of a parameter the band must be right before its border is.
         for r in kept:
             for s in kept:
                 if r != s:
-                    self.jump(bands[r][0], bands[s][0], *least[s], writes=bands[s][1])
+                    self.jump(bands[r][0], bands[s][0], *least[s], writes=bands[s][1], contact=False)
         for r in kept:
             row = pair.rows[r]
-            self.jump(bands[r][0], pair.outer, self.beyond(row, -1, -1))
-            self.jump(bands[r][0], pair.inner, self.beyond(row, 1, 1))
-            self.jump(pair.outer, bands[r][0], self.beyond(row, -1, 1), *least[r], writes=bands[r][1])
-            self.jump(pair.inner, bands[r][0], self.beyond(row, 1, -1), *least[r], writes=bands[r][1])
+            band, writes = bands[r]
+            entering, leaving = pair.contact
+            self.jump(band, pair.outer, self.beyond(row, -1, -1), contact=False)
+            self.jump(band, pair.inner, self.beyond(row, 1, 1), contact=False)
+            self.jump(pair.outer, band, self.beyond(row, -1, 1), *least[r], writes=writes, contact=entering)
+            self.jump(pair.inner, band, self.beyond(row, 1, -1), *least[r], writes=writes, contact=leaving)
+        return [mode for mode, _ in bands.values()]
 
     def mix(self, pairs: Sequence[_ModePair]) -> None:
         """Give every mode the mean of all fields, weighted with the product of what each pair says of its mode.
@@ -242,30 +264,15 @@ class _Bands(Additions):
         self.fields = [field] * len(self.modes)
         self.outputs = [[mean(row)] * len(self.modes) for row in self.outputs]
         self.jumps = list(self.traced.transitions)
-
-    def _repeats(self, pair: _ModePair, r: int) -> bool:
-        """Return whether an earlier row is the same function of the state."""
-        row = pair.rows[r]
-        return any(sp.expand(self.margin(row) - self.margin(earlier)) == 0 for earlier in pair.rows[:r])
+        self.traced = self.put_in()
 
 
 def smooth(description: Description, single: bool, shape: str = "linear") -> Smoothed:
-    """Derive the smoothed system.
-
-    Parameters
-    ----------
-    description : Description
-    single : bool
-        One half width ``eta`` for all indicators; else one for each, ``eta_<indicator>``.
-    shape : str
-        One of `BANDS`.
-
-    Raises
-    ------
-    SystemDefinitionError
-        Transitions with a reset, at a time, without a way back, or bands that overlap: the pair is named.
-    """
-    wanted = smoothed_indicators(description)
+    """Derive the smoothed system, with a ``single`` half width ``eta`` for all indicators or one for each,
+    ``eta_<indicator>``, and a ``shape`` of `BANDS`; what cannot be smoothed is refused, the pair of modes named."""
+    old, apart = without_sticking(description.traced)
+    pairs = _pairs(old)
+    wanted = list(dict.fromkeys(old.indicator_names[row.indicator] for pair in pairs for row in pair.rows))
     etas = (("eta", None),) if single else tuple((f"eta_{name}", name) for name in wanted)
     taken = {*description.parameters, *description.states, *description.memory}
     for name, _ in etas:
@@ -276,9 +283,7 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
             )
     symbols = {name: sp.Symbol(f"p_{name}", real=True) for name, _ in etas}
     of = {name: symbols["eta" if single else f"eta_{name}"] for name in wanted}
-    old, apart = without_sticking(description.traced)
     apart += _check_surfaces(description)
-    pairs = _pairs(old)
     build = _Bands(replace(description, traced=old), of, shape)
     if shape == "arctan":
         if alone := [name for i, name in enumerate(old.mode_names) if all(i not in (p.outer, p.inner) for p in pairs)]:
@@ -286,17 +291,26 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
         build.mix(pairs)
     else:
         apart += _check_apart(build, pairs)
-        for pair in pairs:
-            build.add(pair)
-    n_bands = len(build.modes) - len(old.mode_names)
-    traced = build.put_in(
+        for surface in _surfaces(pairs):
+            build.add(_pairs(build.traced, surface))
+    traced = replace(
+        build.traced,
         p=old.p + tuple(symbols.values()),
         parameter_names=old.parameter_names + tuple(symbols),
         m=tuple(build.m),
         memory_names=old.memory_names + tuple(name for name, _ in build.memory),
-        lacking=old.lacking + (((False,) * len(old.u)),) * n_bands,
     )
     return Smoothed(traced, etas, tuple(build.memory), tuple(apart))
+
+
+def _surfaces(pairs: Sequence[_ModePair]) -> list[set[int]]:
+    """The indicators of the pairs, those of one pair together: the bands over each of these surfaces are one step."""
+    found: list[set[int]] = []
+    for pair in pairs:
+        own = {row.indicator for row in pair.rows}
+        apart = [one for one in found if not one & own]
+        found = [*apart, own.union(*(one for one in found if one & own))]
+    return found
 
 
 def _check_surfaces(description: Description) -> list[tuple[sp.Expr, str]]:
@@ -318,11 +332,15 @@ def _check_surfaces(description: Description) -> list[tuple[sp.Expr, str]]:
 
 
 def _check_apart(build: _Bands, pairs: Sequence[_ModePair]) -> list[tuple[sp.Expr, str]]:
-    """Bands of two pairs that share a mode must be parallel, and then a distance apart."""
+    """Bands of two pairs that share a mode must cross (of all four modes about the crossing one is the other side of
+    another), or be parallel, and then a distance apart."""
     found = []
+    own = {band.indicator for band in build.description.bands} if build.shape == "linear" else set()
     for i, one in enumerate(pairs):
         for two in pairs[i + 1 :]:
             if not {one.outer, one.inner} & {two.outer, two.inner}:
+                continue
+            if not own & {row.indicator for row in one.rows + two.rows} and _cross(one, two, pairs):
                 continue
             what = f"the bands between {_label(build.traced, one.outer, one.inner)} and between " + _label(
                 build.traced, two.outer, two.inner
@@ -341,6 +359,15 @@ def _check_apart(build: _Bands, pairs: Sequence[_ModePair]) -> list[tuple[sp.Exp
                     half = f"{1 / (2 * build.reach):.2g} of" if build.reach > 1 else "half"
                     found.append((room, f"{what} overlap; make eta smaller than {half} their distance"))
     return found
+
+
+def _cross(one: _ModePair, two: _ModePair, pairs: Sequence[_ModePair]) -> bool:
+    """Return whether two pairs that share a mode are two sides of a square whose other sides have the same rows."""
+    across = {(end, pair.rows, end == pair.inner): other for pair in pairs for end, other in pair.ways}
+    (shared,) = {one.outer, one.inner} & {two.outer, two.inner}
+    first, second = dict(one.ways)[shared], dict(two.ways)[shared]
+    there = across.get((first, two.rows, shared == two.inner))
+    return there is not None and there == across.get((second, one.rows, shared == one.inner))
 
 
 def _distance(build: _Bands, a: TracedCondition, b: TracedCondition) -> tuple[sp.Expr, sp.Expr | None]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.symbolic.traced import ALONE, Traced, TracedCondition, TracedTransition
+from nonsmooth.system.symbolic.traced import ALONE, Traced, TracedCondition, TracedTransition, along
 
 LEVEL = 1e-9  # of 1: by how much a static friction may differ from the kinetic one, given as another number
 
@@ -28,15 +28,21 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
             for row in jump.rows:
                 rising.setdefault((jump.target, row.indicator), {}).setdefault(row.sign, jump.source)
     sticks = {key: found for key, found in rising.items() if len(found) == 2 and found[1] != found[-1]}
-    dropped = sorted({mode for mode, _ in sticks})
+    dropped = {mode for mode, _ in sticks}
     if not dropped:
         return traced, []
     apart = [needed for (mode, h), ends in sticks.items() for needed in _equal_friction(traced, mode, h, ends)]
-    between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & set(dropped)}
-    kept = [mode for mode in range(len(traced.mode_names)) if mode not in dropped]
+    between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & dropped}
+    left = [jump for jump in traced.transitions if not {jump.source, jump.target} & dropped]
+    joined = [{mode} for mode in range(len(traced.mode_names)) if mode not in dropped]
+    for ends in ({jump.source, jump.target} for jump in left):
+        joined = [one for one in joined if not one & ends] + [set.union(*(one for one in joined if one & ends))]
+    # Where two stick at once, a question led there and back: other surfaces alone are left to stick to.
+    freed = [len({h for (_, h), ends in sticks.items() if one & {*ends.values()}}) for one in joined]
+    kept = sorted(set.union(*(one for one, own in zip(joined, freed, strict=True) if own == max(freed))))
     jumps: dict[tuple[int, int, tuple[TracedCondition, ...]], TracedTransition] = {}
-    for jump in traced.transitions:
-        if jump.source in dropped or jump.target in dropped:
+    for jump in left:
+        if jump.source not in kept:
             continue
         rows, h = jump.rows, between.get(frozenset((jump.source, jump.target)))
         if h is not None and jump.reset is None:
@@ -71,10 +77,7 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
         f"{traced.name!r} cannot be smoothed between {names[ends[1]]!r} and {names[ends[-1]]!r}: the friction that "
         f"holds in {names[mode]!r} is not the kinetic one, and a band has no other; make them equal"
     )
-    rates = {
-        sp.expand(sum(surface.diff(u) * f for u, f in zip(traced.u, traced.fields[end], strict=True)))
-        for end in ends.values()
-    }
+    rates = {sp.expand(along(surface, traced.t, traced.u, traced.fields[end])) for end in ends.values()}
     if len(rates) == 1:  # a place, whose rate no force changes at once: a preloaded spring
         return []
     found = []
@@ -82,14 +85,15 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
         if jump.source != mode or jump.target not in ends.values() or len(jump.rows) != 1:
             continue
         end = traced.indicators[jump.rows[0].indicator]
-        field = traced.fields[jump.target]
-        rate = surface.diff(traced.t) + sum(surface.diff(u) * f for u, f in zip(traced.u, field, strict=True))
+        rate = along(surface, traced.t, traced.u, traced.fields[jump.target])
         rate, end = (sp.expand(e.subs(symbol, at)) for e in (rate, end))
         shared = sorted(rate.free_symbols & end.free_symbols, key=lambda s: (s not in moving, str(s)))
         if not shared:
             continue  # a state beyond the surface
         ratio = sp.cancel(rate.diff(shared[0]) / end.diff(shared[0]))
-        excess = sp.simplify(rate - ratio * end)
+        largest = LEVEL * max(abs(number) for number in rate.as_coefficients_dict().values())
+        terms = sp.expand(rate - ratio * end).as_coefficients_dict().items()  # those of rounding are none
+        excess = sp.simplify(sp.Add(*(number * term for term, number in terms if abs(number) > largest)))
         if excess == 0:
             continue
         if excess.free_symbols & moving or (excess.is_number and abs(excess) > LEVEL):
@@ -115,12 +119,24 @@ class Additions:
             self.indicators.append(expression)
         return self.indicator_names.index(name)
 
+    def mode(self, name: str, field: Sequence[sp.Expr], outputs: Iterable[sp.Expr]) -> None:
+        """Add a mode with its field and outputs."""
+        self.modes.append(name)
+        self.fields.append(tuple(field))
+        for row, entry in zip(self.outputs, outputs, strict=True):
+            row.append(entry)
+
     def jump(
-        self, source: int, target: int, *rows: TracedCondition, writes: tuple[tuple[int, sp.Expr], ...] = ()
+        self,
+        source: int,
+        target: int,
+        *rows: TracedCondition,
+        writes: tuple[tuple[int, sp.Expr], ...] = (),
+        contact: bool | None = None,
     ) -> None:
-        """Add a transition."""
-        label = f"{self.modes[source]} -> {self.modes[target]}"
-        self.jumps.append(TracedTransition(source, target, rows, None, None, writes, source == 0, label))
+        """Add a transition; without ``contact`` one begins where it leaves the first mode."""
+        label, begins = f"{self.modes[source]} -> {self.modes[target]}", source == 0 if contact is None else contact
+        self.jumps.append(TracedTransition(source, target, rows, None, None, writes, begins, label))
 
     def put_in(self, **more: Any) -> Traced:
         """The derived system; ``more``: its other fields that differ."""

@@ -10,7 +10,7 @@ of one another. Anything else needs ``period=``, which is checked against the eq
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -41,16 +41,8 @@ def timed_expressions(traced: Traced) -> dict[str, sp.Expr]:
 
 
 def forcing_period(expressions: Sequence[sp.Expr], t: sp.Symbol, values: Mapping[sp.Symbol, float]) -> sp.Expr | None:
-    """Return the common period in the parameters, positive at their values, or None where there is none to be read off.
-
-    Parameters
-    ----------
-    expressions : sequence of Expr
-        All that may depend on time.
-    t : Symbol
-    values : mapping of Symbol to float
-        Those of the parameters, on which a frequency may depend.
-    """
+    """Return the common period of expressions in the parameters, positive at their ``values``, or None where there is
+    none to be read off."""
     frequencies: list[sp.Expr] = []
     for expression in expressions:
         if not _collect(expression, t, values, frequencies):
@@ -96,19 +88,8 @@ def _collect(e: sp.Expr, t: sp.Symbol, values: Mapping[sp.Symbol, float], found:
 def check_period(
     expressions: Mapping[str, sp.Expr], t: sp.Symbol, others: Mapping[sp.Symbol, float], period: float, given: str
 ) -> None:
-    """Raise unless every expression repeats after ``period`` (numerically, at fixed pseudo-random points).
-
-    Parameters
-    ----------
-    expressions : mapping of str to Expr
-        What each is, and its expression.
-    t : Symbol
-    others : mapping of Symbol to float
-        Values of the parameters; states and memory are drawn at random.
-    period : float
-    given : str
-        What the user gave, for the message.
-    """
+    """Raise unless every expression, by what it is, repeats after the ``period`` that was ``given``: numerically, at
+    the parameters ``others`` and fixed pseudo-random states and memory."""
     random = np.random.default_rng(5)
     for what, expression in expressions.items():
         if t not in expression.free_symbols:
@@ -128,70 +109,58 @@ def check_period(
                 )
 
 
+#: Of each kind of rule, which finite numbers it allows, and the sentence on another.
+_RULES: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "nonzero": (lambda x: x != 0, "{given} makes {owner} divide by zero: {text} = {number}"),
+    "nonnegative": (lambda x: x >= 0, "{given} makes {owner} take the root of {text}, which is not positive"),
+    "positive": (lambda x: x > 0, "{given} makes {owner} take the logarithm of {text}, which is not positive"),
+    "period": (
+        lambda x: x > 0,
+        "{given} makes the forcing period {text} = {number}; it must be positive and finite",
+    ),
+    "phase": (
+        lambda x: (x >= 0) & (x < 1),
+        "{given} makes {owner}, {text}, {number}; a phase is in forcing periods, 0 <= at < 1",
+    ),
+    "apart": (lambda x: x >= 0, "{given}: {owner}"),
+}
+
+
 class _Rule:
     """One expression of the parameters and what it must be."""
 
     def __init__(self, expression: sp.Expr, kind: str, owner: str, traced: Traced) -> None:
-        self.expression, self.kind, self.owner = expression, kind, owner
-        self._symbols, self._names = traced.p, traced.parameter_names
-        self.used = {
-            name
-            for symbol, name in zip(traced.p, traced.parameter_names, strict=True)
-            if symbol in expression.free_symbols
-        }
+        self.expression, self.owner, self.traced = expression, owner, traced
+        self._allowed, self._says = _RULES[kind]
+        known = zip(traced.p, traced.parameter_names, strict=True)
+        self.used = [name for symbol, name in known if symbol in expression.free_symbols]
 
     @cached_property
     def _scalar(self) -> Any:
-        return sp.lambdify(self._symbols, self.expression, modules="math")
+        return sp.lambdify(self.traced.p, self.expression, modules="math")
 
     @cached_property
     def of_rows(self) -> Any:
-        return sp.lambdify(self._symbols, self.expression, modules="numpy")
+        return sp.lambdify(self.traced.p, self.expression, modules="numpy")
 
     def check(self, values: Mapping[str, float]) -> None:
         try:
-            number = float(self._scalar(*(values[name] for name in self._names)))
+            number = float(self._scalar(*(values[name] for name in self.traced.parameter_names)))
         except (ArithmeticError, ValueError, TypeError):
             number = math.nan
         if not self.allows(number):
-            raise SystemDefinitionError(self._sentence(values, number))
+            given = ", ".join(f"{name} = {values[name]!r}" for name in self.used)
+            text = self.expression.subs({s: sp.Symbol(n) for s, n in self.traced.named().items()})
+            says = self._says.format(given=given, owner=self.owner, text=text, number=number)
+            raise SystemDefinitionError(says)
 
     def allows(self, number: Any) -> Any:
-        finite = np.isfinite(number)
-        if self.kind == "nonzero":
-            return finite & (number != 0)
-        if self.kind == "phase":
-            return finite & (number >= 0) & (number < 1)
-        if self.kind in ("nonnegative", "apart"):
-            return finite & (number >= 0)
-        return finite & (number > 0)
-
-    def _sentence(self, values: Mapping[str, float], number: float) -> str:
-        given = ", ".join(f"{name} = {values[name]!r}" for name in self._names if name in self.used)
-        text = str(self.expression.subs({s: sp.Symbol(n) for s, n in zip(self._symbols, self._names, strict=True)}))
-        if self.kind == "apart":
-            return f"{given}: {self.owner}"
-        if self.kind == "period":
-            return f"{given} makes the forcing period {text} = {number}; it must be positive and finite"
-        if self.kind == "phase":
-            return f"{given} makes {self.owner}, {text}, {number}; a phase is in forcing periods, 0 <= at < 1"
-        if self.kind == "nonzero":
-            return f"{given} makes {self.owner} divide by zero: {text} = {number}"
-        what = "root" if self.kind == "nonnegative" else "logarithm"
-        return f"{given} makes {self.owner} take the {what} of {text}, which is not positive"
+        return np.isfinite(number) & self._allowed(number)
 
 
 class Domain:
-    """The conditions on the parameters of a traced system.
-
-    Parameters
-    ----------
-    traced : Traced
-    apart : iterable of (expression, message), optional
-        Further expressions of the parameters that must not be negative.
-    limits : iterable of (expression, message), optional
-        Those that a fit may try.
-    """
+    """The conditions on the parameters of a traced system; ``apart`` are further expressions of them that must not be
+    negative, each with its message, ``limits`` those that may be where a fit tries it."""
 
     def __init__(
         self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = (), limits: Iterable[tuple[sp.Expr, str]] = ()
@@ -219,24 +188,18 @@ class Domain:
             self._rules.append(_Rule(traced.period, "period", "", traced))
         self._rules += [_Rule(phase, "phase", owner, traced) for owner, phase in phases.items()]
         self._rules += [_Rule(expression, "apart", message, traced) for expression, message in apart]
-        self._limits = [_Rule(expression, "apart", message, traced) for expression, message in limits]
+        self._of_given = [*self._rules, *(_Rule(entry, "apart", message, traced) for entry, message in limits)]
 
-    def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None, *, tried: bool = False) -> None:
-        """Raise SystemDefinitionError where ``values`` are not allowed.
-
-        Parameters
-        ----------
-        values : mapping of name to float
-        changed : iterable of str, optional
-            Only what depends on these has to be looked at.
-        tried : bool
-            By a fit: limits of what is given are none of what it comes by.
-        """
+    def check(
+        self, values: Mapping[str, float], changed: Collection[str] | None = None, *, tried: bool = False
+    ) -> None:
+        """Raise SystemDefinitionError where ``values`` are not allowed; only what depends on those that ``changed`` has
+        to be looked at. Of what a fit tries limits are not asked."""
         for name in values if changed is None else changed:
             if name in self._zero and values[name] == 0:
                 raise SystemDefinitionError(self._by_zero(name))
-        for rule in self._rules if tried else (*self._rules, *self._limits):
-            if changed is None or not rule.used.isdisjoint(changed):
+        for rule in self._rules if tried else self._of_given:
+            if changed is None or any(name in changed for name in rule.used):
                 rule.check(values)
 
     def _by_zero(self, name: str) -> str:
@@ -250,7 +213,7 @@ class Domain:
         for name in self._zero:
             if (points[:, self._names.index(name)] == 0).any():
                 raise SystemDefinitionError(self._by_zero(name))
-        for rule in (*self._rules, *self._limits):
+        for rule in self._of_given:
             with np.errstate(all="ignore"):
                 refused = ~np.broadcast_to(rule.allows(rule.of_rows(*points.T)), len(points))
             if refused.any():

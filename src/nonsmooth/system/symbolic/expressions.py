@@ -15,40 +15,17 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import shortened
+from nonsmooth.system.symbolic.printing import FUNCTIONS, RELATIONS
 from nonsmooth.system.symbolic.scalar import to_expression
 
 _NAMES: dict[Any, str] = {
-    sp.sin: "sin",
-    sp.cos: "cos",
-    sp.tan: "tan",
-    sp.asin: "arcsin",
-    sp.acos: "arccos",
-    sp.atan: "arctan",
-    sp.atan2: "arctan2",
-    sp.sinh: "sinh",
-    sp.cosh: "cosh",
-    sp.tanh: "tanh",
-    sp.asinh: "arcsinh",
-    sp.acosh: "arccosh",
-    sp.atanh: "arctanh",
-    sp.exp: "exp",
-    sp.log: "log",
+    **{function: name for function, (_, name) in FUNCTIONS.items()},
     sp.Abs: "abs",
     sp.sign: "sign",
     sp.Max: "max",
     sp.Min: "min",
-    sp.floor: "floor",
-    sp.ceiling: "ceil",
 }
 _FUNCTIONS: dict[str, Callable[..., Any]] = {name: function for function, name in _NAMES.items()} | {"sqrt": sp.sqrt}
-_RELATIONS: dict[Any, str] = {
-    sp.StrictLessThan: "<",
-    sp.LessThan: "<=",
-    sp.StrictGreaterThan: ">",
-    sp.GreaterThan: ">=",
-    sp.Eq: "==",
-    sp.Ne: "!=",
-}
 _COMPARE: dict[type, Callable[[Any, Any], Any]] = {
     ast.Lt: sp.StrictLessThan,
     ast.LtE: sp.LessThan,
@@ -117,9 +94,9 @@ def _write(e: Any, names: Mapping[sp.Symbol, str]) -> tuple[str, int]:
         return joiner.join(ordered), _SUM
     if isinstance(e, sp.Not):
         return f"not {inside(e.args[0], _ATOM)}", _SUM
-    if type(e) in _RELATIONS:
+    if type(e) in RELATIONS:
         left, right = e.args
-        return f"{inside(left, _SUM)} {_RELATIONS[type(e)]} {inside(right, _SUM)}", _SUM
+        return f"{inside(left, _SUM)} {RELATIONS[type(e)]} {inside(right, _SUM)}", _SUM
     if type(e) in _NAMES:
         return f"{_NAMES[type(e)]}({', '.join(_write(part, names)[0] for part in e.args)})", _ATOM
     raise TypeError(f"{type(e).__name__} in {e} has no text form")
@@ -146,19 +123,8 @@ def _write_product(e: Any, inside: Callable[[Any, int], str]) -> tuple[str, int]
 
 
 def read_expression(text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
-    """Return the expression of `write_expression`'s text; nothing is executed.
-
-    Parameters
-    ----------
-    text : str
-    symbols : mapping of str to Symbol
-        What ``t``, ``u.x``, ``p.k`` stand for.
-
-    Raises
-    ------
-    ValueError
-        Anything but numbers, the known names, arithmetic, comparisons and the known functions.
-    """
+    """Return the expression of `write_expression`'s text, ``symbols`` being those of ``t``, ``u.x``, ``p.k``; nothing
+    is executed. Anything but numbers, these names, arithmetic, comparisons, the known functions is a ValueError."""
     if not isinstance(text, str):
         raise ValueError(f"an expression must be a string, not {shortened(text)}")
     if len(text) > _LONGEST:

@@ -37,7 +37,8 @@ FUNCTIONS: dict[type, tuple[str, str]] = {
     sympy.floor: ("floor", "floor"),
     sympy.ceiling: ("ceil", "ceil"),
 }
-_CORNERS = (
+#: Operations with a corner or a jump, which have no Taylor series everywhere.
+CORNERS = (
     sympy.Abs,
     sympy.sign,
     sympy.Max,
@@ -47,27 +48,20 @@ _CORNERS = (
     sympy.floor,
     sympy.ceiling,
     sympy.Mod,
-    Boolean,
 )
-_RELATIONS = {"Gt": ">", "Ge": ">=", "Lt": "<", "Le": "<=", "Eq": "==", "Ne": "!="}
-_RELATION_TYPES = (sympy.Gt, sympy.Ge, sympy.Lt, sympy.Le, sympy.Eq, sympy.Ne)
-
-
-def is_corner(expression: Basic) -> bool:
-    """Return whether the outermost operation has a corner or a jump, hence no Taylor series everywhere."""
-    return isinstance(expression, _CORNERS)
+RELATIONS: dict[type, str] = {
+    sympy.Gt: ">",
+    sympy.Ge: ">=",
+    sympy.Lt: "<",
+    sympy.Le: "<=",
+    sympy.Eq: "==",
+    sympy.Ne: "!=",
+}
 
 
 class Printer:
-    """Text of an expression whose symbols (and named subexpressions) are called as in ``names``.
-
-    Parameters
-    ----------
-    names
-        Expression -> identifier. A mapping that grows while :func:`assignments` names subexpressions.
-    arrays
-        Write NumPy code that works elementwise instead of scalar code with functions of ``math``.
-    """
+    """Text of an expression whose symbols and subexpressions are called as in ``names``, which grow while
+    :func:`assignments` names some: scalar code with functions of ``math``, or code of NumPy for ``arrays``."""
 
     def __init__(self, names: Mapping[Basic, str], arrays: bool = False) -> None:
         self.names: dict[Basic, str] = dict(names)
@@ -190,10 +184,8 @@ class Printer:
     def _condition(self, e: Boolean) -> str:
         if isinstance(e, BooleanTrue | BooleanFalse):
             return str(bool(e))
-        if isinstance(e, _RELATION_TYPES):
-            for kind, mark in _RELATIONS.items():
-                if isinstance(e, getattr(sympy, kind)):
-                    return f"({self(e.args[0])} {mark} {self(e.args[1])})"
+        if type(e) in RELATIONS:
+            return f"({self(e.args[0])} {RELATIONS[type(e)]} {self(e.args[1])})"
         both: dict[type, tuple[str, str]] = {sympy.And: (" and ", " & "), sympy.Or: (" or ", " | ")}
         if type(e) in both:
             return f"({both[type(e)][self.arrays].join(self(a) for a in e.args)})"

@@ -16,6 +16,7 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.system.symbolic.printing import FUNCTIONS
 
 _DECISION = (
     "`{}` cannot be decided while the function is traced: a Python `if`, `max()`, `min()`, `np.where` on a state or "
@@ -237,33 +238,14 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     return Scalar(sp.Piecewise((to_expression(a), _relation(condition)), (to_expression(b), sp.true)))
 
 
-def _unary(make: Callable[[Any], Any]) -> Callable[[Any], Scalar]:
-    return lambda x: Scalar(make(to_expression(x)))
+def _of_numbers(make: Callable[..., Any], kind: Callable[[Any], Any]) -> Callable[..., Any]:
+    return lambda *numbers: kind(make(*map(to_expression, numbers)))
 
 
-def _two(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Scalar]:
-    return lambda x, y: Scalar(make(to_expression(x), to_expression(y)))
-
-
-_UNARY: dict[str, Callable[[Any], Any]] = {
-    "sin": sp.sin,
-    "cos": sp.cos,
-    "tan": sp.tan,
-    "arcsin": sp.asin,
-    "arccos": sp.acos,
-    "arctan": sp.atan,
-    "sinh": sp.sinh,
-    "cosh": sp.cosh,
-    "tanh": sp.tanh,
-    "arcsinh": sp.asinh,
-    "arccosh": sp.acosh,
-    "arctanh": sp.atanh,
-    "exp": sp.exp,
-    "log": sp.log,
+_UNARY: dict[str, Callable[..., Any]] = {
+    **{name: function for function, (_, name) in FUNCTIONS.items() if function is not sp.atan2},
     "sqrt": sp.sqrt,
     "sign": sp.sign,
-    "floor": sp.floor,
-    "ceil": sp.ceiling,
     "absolute": sp.Abs,
     "fabs": sp.Abs,
     "exp2": lambda x: sp.Integer(2) ** x,
@@ -281,7 +263,7 @@ _UNARY: dict[str, Callable[[Any], Any]] = {
     "rad2deg": lambda x: x * 180 / sp.pi,
     "degrees": lambda x: x * 180 / sp.pi,
 }
-_BINARY: dict[str, Callable[[Any, Any], Any]] = {
+_BINARY: dict[str, Callable[..., Any]] = {
     "add": lambda x, y: x + y,
     "subtract": lambda x, y: x - y,
     "multiply": lambda x, y: x * y,
@@ -308,14 +290,9 @@ _COMPARE: dict[str, Callable[[Any, Any], Any]] = {
 }
 
 
-def _ordering(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Relation]:
-    return lambda x, y: Relation(make(to_expression(x), to_expression(y)))
-
-
 _UFUNCS: dict[str, Callable[..., Any]] = {
-    **{name: _unary(make) for name, make in _UNARY.items()},
-    **{name: _two(make) for name, make in _BINARY.items()},
-    **{name: _ordering(make) for name, make in _COMPARE.items()},
+    **{name: _of_numbers(make, Scalar) for name, make in {**_UNARY, **_BINARY}.items()},
+    **{name: _of_numbers(make, Relation) for name, make in _COMPARE.items()},
 }
 # Inside an object array NumPy looks for a method of the function's name on each element.
 for _name in (*_UNARY, "arctan2", "hypot", "heaviside"):

@@ -6,8 +6,9 @@ derivatives, the code generator, the smoothed switch and the text form.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -21,8 +22,12 @@ OWN, ASKS_BEHIND = "own", "asks behind"  # of the system's own beside elements t
 NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion has no unique way on
 
 
-@dataclass(frozen=True)
-class TracedCondition:
+def along(expression: Expr, t: Symbol, u: Iterable[Symbol], field: Iterable[Expr]) -> Expr:
+    """The derivative in time of an expression along a vector field: h_t + h_u f."""
+    return expression.diff(t) + sum(expression.diff(symbol) * entry for symbol, entry in zip(u, field, strict=True))
+
+
+class TracedCondition(NamedTuple):
     """One sign condition: ``sign * indicator > 0`` (``>= 0`` where not strict).
 
     A non-strict row settles a tie in derived systems (the smoothed switch, the regions of a map): it also holds where
@@ -146,14 +151,17 @@ class Traced:
                 kept.append(jump)
         return replace(self, transitions=tuple(kept)), tuple(stands)
 
+    def named(self, u: str = "", p: str = "") -> dict[Symbol, str]:
+        """Names of the symbols in text; those of states begin with ``u``, those of parameters and memory with ``p``."""
+        names = (
+            *(u + name for name in self.state_names),
+            *(p + n for n in (*self.parameter_names, *self.memory_names)),
+        )
+        return {self.t: "t", **dict(zip((*self.u, *self.p, *self.m), names, strict=True))}
+
     def keeps_at_zero(self, mode: int, indicator: int) -> bool:
         """Return whether motion in a mode slides along the surface of an indicator."""
         return mode < len(self.along) and indicator in self.along[mode]
-
-    def is_idle(self, mode: int, indicator: int) -> bool:
-        """Return whether an indicator is a condition of elements that is not asked for in a mode: it is not computed
-        there."""
-        return self.decider is not None and indicator in self.decider.idle[mode]
 
     def phase_text(self, jump: TracedTransition) -> str:
         """The phase of a transition as it was written."""
@@ -162,7 +170,7 @@ class Traced:
         from nonsmooth.system.symbolic.expressions import write_expression
 
         assert jump.at is not None
-        return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))
+        return write_expression(jump.at, self.named())
 
     def ends(self, jump: TracedTransition) -> bool:
         """Return whether motion is not unique behind a transition, so that a run ends there."""

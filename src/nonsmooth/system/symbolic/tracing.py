@@ -11,25 +11,16 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
+from nonsmooth.system.symbolic.printing import CORNERS
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, exact, to_expression
-
-# What no method can see inside a mode: the derivative jumps and nothing says where.
-_CORNERS = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
 
 _LARGEST = sp.Integer(int(sys.float_info.max))
 
 
 class Symbols:
-    """The symbols of a system; prefixes keep a parameter called ``lambda`` or ``t`` from clashing.
+    """The symbols of a system, by names with units; prefixes keep a parameter called ``lambda`` or ``t`` from clashing.
 
-    Parameters
-    ----------
-    name : str
-        The system's name, for messages.
-    states, parameters, memory : mapping of name to unit
-    inputs : sequence of str
-        The states that stand for inputs: functions read them among the parameters.
-    """
+    ``inputs`` are the states that stand for inputs: functions read them among the parameters."""
 
     def __init__(
         self,
@@ -47,11 +38,29 @@ class Symbols:
         self.m = {key: sp.Symbol(f"m_{key}", real=True) for key in memory}
         self.inputs = {key: self.u[key] for key in inputs}
 
+    def of_traced(self) -> dict[str, Any]:
+        """The symbols and their names, as parts of a `Traced`."""
+        return {
+            "t": self.t,
+            "u": tuple(self.u.values()),
+            "p": tuple(self.p.values()),
+            "m": tuple(self.m.values()),
+            "state_names": tuple(self.u),
+            "parameter_names": tuple(self.p),
+            "memory_names": tuple(self.m),
+        }
+
     def states(self, names: Sequence[str] | None = None, owner: str | None = None) -> States:
         """The state vector as a function sees it: all states, or those a mode has."""
         chosen = {name: self.u[name] for name in (self.u if names is None else names) if name not in self.inputs}
         units = {name: self.units[name] for name in chosen}
         return States({name: Scalar(symbol) for name, symbol in chosen.items()}, units, owner or repr(self.name))
+
+    def arguments(
+        self, own: Sequence[str] | None = None, owner: str | None = None
+    ) -> tuple[Scalar, States, Parameters]:
+        """The arguments (t, u, p) of a function of a mode, which has all states or its ``own``."""
+        return Scalar(self.t), self.states(own, owner), self.parameters()
 
     def parameters(self, extra: Mapping[str, sp.Symbol] | None = None) -> Parameters:
         """The parameters as a function sees them: parameters, memory, inputs and ``extra`` symbols by name."""
@@ -143,16 +152,7 @@ class KnownFunction:
 def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: Sequence[str], what: str) -> tuple:
     """Call a user's function and return one expression per name; what it returns is in their order or a mapping.
 
-    Parameters
-    ----------
-    function : callable
-    arguments : sequence
-        What it is called with, usually (t, u, p).
-    names : sequence of str
-        What the entries of its result are.
-    what : str
-        Which function this is, for messages: "the vector field of mode 'free'".
-    """
+    ``what`` says in messages which function it is: "the vector field of mode 'free'"."""
     result = call(function, arguments, what)
     if isinstance(result, Scalar) or np.isscalar(result):
         result = (result,)
@@ -173,7 +173,11 @@ def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: S
 
 def call_scalar(function: Callable[..., Any], arguments: Sequence[Any], what: str) -> sp.Expr:
     """Call a user's function and return the one expression it gives."""
-    result = call(function, arguments, what)
+    return one_number(call(function, arguments, what), what)
+
+
+def one_number(result: Any, what: str) -> sp.Expr:
+    """The expression of a number, given or returned by a user's function."""
     if isinstance(result, (tuple, list, States)) or (isinstance(result, np.ndarray) and result.ndim):
         if len(result) != 1:
             raise SystemDefinitionError(f"{what} must return one number; it returned {len(result)} values")
@@ -249,7 +253,7 @@ def _entry(value: Any, what: str) -> sp.Expr:
 
 def refuse_corners(expression: sp.Expr, state: set[sp.Symbol], what: str) -> None:
     """Raise where ``expression`` has a corner (abs, sign, max, where, ...) in one of the symbols ``state``."""
-    for corner in expression.atoms(*_CORNERS):
+    for corner in expression.atoms(*CORNERS):
         if corner.free_symbols & state:
             kind = {"Piecewise": "where", "Abs": "abs", "Max": "max", "Min": "min"}.get(
                 type(corner).__name__, type(corner).__name__

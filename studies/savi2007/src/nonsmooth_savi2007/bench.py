@@ -15,10 +15,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
+from nonsmooth.recordings import RecordingWarning
 from nonsmooth_savi2007.figures.figure import Figure, finish
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import Laboratory
@@ -70,8 +73,8 @@ class Measurement:
         """
         if self.process is None:
             return
+        ended = False
         with open(self.log, encoding="utf-8", errors="replace") as lines:
-            ended = False
             while not ended:
                 ended = self.process.poll() is not None
                 for line in lines.read().splitlines():
@@ -97,7 +100,8 @@ def measure(folder: str, names: Sequence[str], quick: bool, full: bool = False) 
     global _settings
     _settings = Settings(quick=quick, full=full, progress=False, laboratory=laboratory, folder=place)
     begin, busy = time.perf_counter(), time.process_time()
-    n = len(laboratory.identified)  # kept there for all that follows
+    with _noted() as notes:
+        n = len(laboratory.identified)  # kept there for all that follows
     took = time.perf_counter() - begin
     print(f"{n} parameters identified: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
     tasks = [[name for name in group if name in names] for group in _GROUPS]
@@ -109,7 +113,7 @@ def measure(folder: str, names: Sequence[str], quick: bool, full: bool = False) 
     else:
         with ProcessPoolExecutor(workers, multiprocessing.get_context("fork")) as pool:
             rows = list(pool.map(_task, tasks))
-    for note in dict.fromkeys([*laboratory.notes, *(note for row in rows for note in row)]):
+    for note in dict.fromkeys(note for row in (notes, *rows) for note in row):
         print(f"note: {note}")
 
 
@@ -126,10 +130,25 @@ def _known() -> dict[str, Figure]:
 
 def _task(names: Sequence[str]) -> list[str]:
     """Measure figures one after the other; what there is to note."""
-    for name in names:
-        begin, busy = time.perf_counter(), time.process_time()
-        data = _known()[name].compute(_settings)
-        took = time.perf_counter() - begin
-        finish(name, data, took, _settings)
-        print(f"{name}: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
-    return list(_settings.bench.notes)
+    with _noted() as notes:
+        for name in names:
+            begin, busy = time.perf_counter(), time.process_time()
+            data = _known()[name].compute(_settings)
+            took = time.perf_counter() - begin
+            finish(name, data, took, _settings)
+            print(f"{name}: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
+    return notes
+
+
+@contextmanager
+def _noted() -> Iterator[list[str]]:
+    """Warnings about recordings are kept for the log; others stay warnings."""
+    notes = list[str]()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield notes
+    for item in caught:
+        if issubclass(item.category, RecordingWarning):
+            notes.append(str(item.message))
+        else:
+            warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)

@@ -7,9 +7,7 @@ Identification and comparison read the folders only.
 from __future__ import annotations
 
 import json
-import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,7 +17,7 @@ import xarray as xr
 
 from nonsmooth import ParameterSet, Recording, __version__, compare
 from nonsmooth.models import discontinuous_support
-from nonsmooth.recordings import RecordingWarning, Session, load_session
+from nonsmooth.recordings import Session, load_session
 from nonsmooth.recordings.signals.displacement import found_resolution
 from nonsmooth_savi2007.comparison import GapOffset, gap_offset, session_measurement
 from nonsmooth_savi2007.identification.chain import identify
@@ -53,26 +51,21 @@ class Laboratory:
 
     def __init__(self, folder: Path, quick: bool = False, procedures: Collection[str] = IDENTIFICATION) -> None:
         self.folder, self.quick, self.procedures = Path(folder), quick, procedures
-        self.notes: list[str] = []
         self.folder.mkdir(parents=True, exist_ok=True)
 
     @cached_property
     def rig(self) -> VirtualRig:
         """The rig of Table 1, with more physics than the model: friction, strings, an uneven motor, sensors."""
-
         return VirtualRig.published(SEED)
 
     @cached_property
     def identified(self) -> ParameterSet:
         """The parameters, from the folder ``identification`` alone."""
-
-        with self._noted():
-            return identify(self._identification)
+        return identify(self._identification)
 
     @cached_property
     def session(self) -> Session:
         """The session that identification reads."""
-
         return load_session(self._identification)
 
     @cached_property
@@ -91,17 +84,15 @@ class Laboratory:
         def channels(procedure: str, name: str) -> list[xr.DataArray]:
             return [one.recording.channel(name, one.run) for one in self.session.recordings(procedure)]
 
-        with self._noted():
-            angle, force = (channels("springs", name)[0] for name in ("Angle", "Force"))
-            volts = [float(one.settings["voltage"]) for one in self.session.recordings("voltage")]
-            pushed, taps = channels("support", "Force"), channels("impulse", "Angle")
-        steps = np.diff(angle["time"].values)
-        turning = max(float(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max()) for tap in taps)
+        angle, force = (channels("springs", name)[0] for name in ("Angle", "Force"))
+        volts = [float(one.settings["voltage"]) for one in self.session.recordings("voltage")]
+        pushed, taps = channels("support", "Force"), channels("impulse", "Angle")
+        turning = max(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max() for tap in taps)
         values = {
-            "rate": (1 / np.median(steps), "Hz", "sample rate"),
-            "angle_step": (float(np.degrees(found_resolution(angle))), "deg", "step of the rotary sensor"),
-            "force_step": (float(found_resolution(force)), "N", "step of the force sensor"),
-            "force_used": (max(float(np.abs(one.values).max()) for one in pushed), "N", "largest force recorded"),
+            "rate": (1 / np.median(np.diff(angle["time"].values)), "Hz", "sample rate"),
+            "angle_step": (np.degrees(found_resolution(angle)), "deg", "step of the rotary sensor"),
+            "force_step": (found_resolution(force), "N", "step of the force sensor"),
+            "force_used": (max(np.abs(one.values).max() for one in pushed), "N", "largest force recorded"),
             "turning": (turning / (2 * np.pi), "1/s", "fastest turning of the rotary sensor after a tap"),
             "volts_low": (min(volts), "V", "lowest motor voltage"),
             "volts_high": (max(volts), "V", "highest"),
@@ -113,26 +104,20 @@ class Laboratory:
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
-
         return load_session(self._write(name, made))
 
     def with_support(self, session: Session, procedure: str) -> list[str]:
         """The runs of a procedure in which the support was mounted."""
-        with self._noted():
-            return [item.run for item in session.recordings(procedure) if "gap" in item.settings]
+        return [item.run for item in session.recordings(procedure) if "gap" in item.settings]
 
     def measured(
-        self, session: Session, procedure: str, runs: str | Sequence[str] | None = None
+        self, session: Session, procedure: str, runs: str | Sequence[str]
     ) -> tuple[xr.Dataset, dict[str, Any]]:
         """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
-
-        k, offset = self.identified["k"], self._gap_offset
-        with self._noted():
-            return session_measurement(session, procedure, runs, k=k, gap_offset=offset)
+        return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=self._gap_offset)
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""
-
         return compare(
             measured, discontinuous_support(), parameters=self.identified, settings=settings, draws=0, **options
         )
@@ -140,21 +125,7 @@ class Laboratory:
     @cached_property
     def _gap_offset(self) -> GapOffset:
         """Gap less the screw's reading, from the records with contact, and its uncertainty."""
-
-        with self._noted():
-            return gap_offset(self.identified, self.session)
-
-    @contextmanager
-    def _noted(self) -> Iterator[None]:
-        """Warnings about recordings are kept for the log; others stay warnings."""
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            yield
-        for item in caught:
-            if issubclass(item.category, RecordingWarning):
-                self.notes.append(str(item.message))
-            else:
-                warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+        return gap_offset(self.identified, self.session)
 
 
 def as_result(dataset: xr.Dataset, what: str, verb: str = "rig", *, synthetic: bool = True) -> xr.Dataset:

@@ -51,7 +51,7 @@ class Interval(NamedTuple):
     @property
     def uncertainty(self) -> float:
         """The standard uncertainty: of something that lies anywhere in it with the same probability."""
-        return float(self.expanded / np.sqrt(3))
+        return self.expanded / np.sqrt(3)
 
     def __str__(self) -> str:
         return with_uncertainty(self.value, self.uncertainty)
@@ -70,9 +70,8 @@ def parameter_of(swept: xr.Dataset) -> str:
 def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
     """Parameter values, rising, and the regime at each: the period number, APERIODIC or UNSETTLED."""
     one = swept if direction is None or "direction" not in swept.dims else swept.sel(direction=direction)
-    values = one[parameter_of(one)].values
-    order = np.argsort(values)
-    return values[order], _regime(one)[order]
+    one = one.sortby(parameter_of(one))
+    return one[parameter_of(one)].values, _regime(one)
 
 
 def status_names(result: xr.Dataset) -> NDArray[np.str_]:
@@ -93,9 +92,9 @@ def changes(swept: xr.Dataset, first: int, second: int, direction: str | None = 
     values, regime = regimes(swept, direction)
     at = np.flatnonzero(regime != UNSETTLED)
     return [
-        Interval(float(values[i]), float(values[j]))
+        Interval(values[i], values[j])
         for i, j in pairwise(at)
-        if {int(regime[i]), int(regime[j])} == {first, second} and first != second
+        if {regime[i], regime[j]} == {first, second} and first != second
     ]
 
 
@@ -113,14 +112,11 @@ def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None
     """Smallest and largest parameter value with a regime; None where it does not occur."""
     values, regime = regimes(swept, direction)
     at = np.flatnonzero(regime == regime_wanted)
-    return (float(values[at[0]]), float(values[at[-1]])) if len(at) else None
+    return (values[at[0]], values[at[-1]]) if len(at) else None
 
 
 def _sized_jumps(response: xr.Dataset, direction: str) -> list[tuple[float, Interval]]:
-    """The jumps of an amplitude in one direction, computed or measured: size, and the step that holds it.
-
-    At rising values.
-    """
+    """The jumps of an amplitude in one direction, computed or measured, at rising values: size and step of each."""
     here = response["jump_direction"].values.astype(str) == direction
     if "jump_variable" in response:
         here &= response["jump_variable"].values.astype(str) == "x"
@@ -152,8 +148,8 @@ def small_jump(response: xr.Dataset, direction: str) -> Interval | None:
 def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
     """Frequencies, rising, and the period number measured at each; of one direction or of all runs."""
     mine = runs if direction is None else runs.isel(run=runs["direction"].values.astype(str) == direction)
-    order = np.argsort(mine["omega"].values, kind="stable")
-    return mine["omega"].values[order], mine["period_number"].values[order].astype(np.int64)
+    mine = mine.sortby("omega")
+    return mine["omega"].values, mine["period_number"].values.astype(np.int64)
 
 
 def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
@@ -172,4 +168,4 @@ def separation_rate(twins: xr.Dataset) -> tuple[float, float]:
     half = len(points) // 2
     distance = np.linalg.norm(points[half:] - points[:half], axis=-1)
     rates = np.log(distance[:, -1] / distance[:, 0]) / (distance.shape[1] - 1)
-    return float(rates.mean()), float(rates.std(ddof=1) / np.sqrt(half))
+    return rates.mean(), rates.std(ddof=1) / np.sqrt(half)

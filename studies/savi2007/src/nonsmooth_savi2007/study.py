@@ -15,14 +15,15 @@ from nonsmooth.plot import journal, save_figure
 from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.claims.claims import Statement, measure_claims
 from nonsmooth_savi2007.figures import (
-    amplitude,
+    attractor,
     band,
     charts,
     coexisting,
-    frequency,
-    gap,
+    diagrams,
+    measured_diagrams,
+    motions,
     parameters,
-    regions,
+    portraits,
     resonance,
 )
 from nonsmooth_savi2007.figures.figure import Figure, finish, finished, just_made, refuse_strange
@@ -32,7 +33,18 @@ from nonsmooth_savi2007.report.report import REPORTS, write_report
 PICTURE_DPI = 200
 PARAMETERS = "table1"
 #: Files that hold figures.
-FILES = (regions, resonance, amplitude, gap, frequency, coexisting, charts, band, parameters)
+FILES = (
+    resonance,
+    diagrams,
+    portraits,
+    attractor,
+    coexisting,
+    charts,
+    band,
+    parameters,
+    measured_diagrams,
+    motions,
+)
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ def run(procedure, time, x=None, *, force=None, turns=None, name="Run #1", **set
         procedure,
         name,
         settings,
+        COUNT,
         None if x is None else channel(x, "Angle"),
         None if force is None else channel(force, "Force"),
         None if turns is None else np.asarray(turns),

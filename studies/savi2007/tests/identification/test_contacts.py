@@ -33,7 +33,7 @@ def three_runs():
 @pytest.fixture(scope="module")
 def fitted():
     decay = decay_of(W, B, F, PLACE)
-    return shoot_contacts(three_runs(), decay, resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA)
+    return shoot_contacts(three_runs(), decay, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA)
 
 
 def test_contact_parameters_and_gap_lie_within_their_uncertainty(fitted):
@@ -60,7 +60,7 @@ def test_the_gates_mark_may_be_anywhere(mark):
         crank_length=0.030,
         gap=GAP,
     )
-    found = shoot_contacts([turned], decay_of(W, B, F, PLACE), resolution=COUNT, kappa=KAPPA, gamma=GAMMA, mark=mark)
+    found = shoot_contacts([turned], decay_of(W, B, F, PLACE), kappa=KAPPA, gamma=GAMMA, mark=mark)
     error = np.sqrt(np.diag(found.covariance))
     assert abs(found.values[7] - 0.030) < 4 * error[7] and abs(found.values[8] - mark) < 4 * error[8] + 1e-3
     assert abs(found.values[3] - KAPPA) < 3.5 * error[3] and not found.left and found.excess < 1.4
@@ -68,8 +68,8 @@ def test_the_gates_mark_may_be_anywhere(mark):
 
 def test_one_contact_tells_less_than_all_together(fitted):
     m = 0.84
-    many = contact_finding(fitted, Quantity(m), resolution=COUNT)
-    single = one_contact(fitted, decay_of(W, B, F, PLACE), m, resolution=COUNT, kappa_error=1e-3 * KAPPA)
+    many = contact_finding(fitted, Quantity(m))
+    single = one_contact(fitted, decay_of(W, B, F, PLACE), m, kappa_error=1e-3 * KAPPA)
     assert many.estimate.logarithmic and single.estimate.factor > many.estimate.factor > 1
     # by the root of their number and more
     ratio = np.log(single.estimate.factor) / np.log(many.estimate.factor)
@@ -85,7 +85,7 @@ def test_one_contact_tells_less_than_all_together(fitted):
 
 def test_the_fit_is_the_same_from_another_first_guess(fitted):
     decay = decay_of(W, B, F, PLACE)
-    other = shoot_contacts(three_runs(), decay, resolution=COUNT, kappa=0.9 * KAPPA, gamma=1.6 * GAMMA)
+    other = shoot_contacts(three_runs(), decay, kappa=0.9 * KAPPA, gamma=1.6 * GAMMA)
     error = np.sqrt(np.diag(fitted.covariance))
     # windows are cut where the first guess has no contact: elsewhere
     assert np.all(np.abs(other.values - fitted.values) < 0.4 * error)
@@ -97,7 +97,7 @@ def test_a_motor_that_wanders_is_in_the_uncertainty():
         return lambda t: omega * t + omega * size / rate * np.sin(rate * t + omega)
 
     runs = [driven(omega, crank, 10.0, phase=wandering(omega)) for omega, crank in ((11.15, 0.039), (8.0, 0.030))]
-    found = shoot_contacts(runs, decay_of(W, B, F, PLACE), resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA)
+    found = shoot_contacts(runs, decay_of(W, B, F, PLACE), kappa=1.1 * KAPPA, gamma=0.5 * GAMMA)
     error = np.sqrt(np.diag(found.covariance))
     assert abs(found.values[3] - KAPPA) < 3 * error[3] and abs(found.values[4] - GAMMA) < 3 * error[4]
     for i in range(2):
@@ -109,7 +109,7 @@ def test_a_motor_that_wanders_is_in_the_uncertainty():
 
 def told(values, errors, readings):
     """Values that `counted_gap` compares: a gap per run, independent of each other."""
-    runs = tuple(SimpleNamespace(name=f"Run #{i + 1}", settings={"gap": r}) for i, r in enumerate(readings))
+    runs = tuple(SimpleNamespace(name=f"Run #{i + 1}", gap=r) for i, r in enumerate(readings))
     return SimpleNamespace(
         runs=runs, values=np.array(values), covariance=np.diag(np.square(errors)), place=lambda run, which: run
     )
@@ -143,4 +143,4 @@ def test_records_without_contact_are_refused():
         gap=0.0018,
     )
     with pytest.raises(ValueError, match="no run shows a contact"):
-        shoot_contacts([free], decay_of(W, B, F), resolution=COUNT, kappa=KAPPA, gamma=GAMMA)
+        shoot_contacts([free], decay_of(W, B, F), kappa=KAPPA, gamma=GAMMA)

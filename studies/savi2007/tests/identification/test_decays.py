@@ -12,7 +12,7 @@ from nonsmooth_savi2007.identification.decay_findings import (
     log_decrement,
     support_damping,
 )
-from nonsmooth_savi2007.identification.free_decay import free_decay
+from nonsmooth_savi2007.identification.free_decay import Decay, free_decay
 
 MASS, STIFF, C_S = 1.33, 1210.0, 0.60
 
@@ -30,7 +30,7 @@ def drops(heights=(0.011, 0.009, 0.008, 0.007), c=C_S, seed=0, duration=12):
 
 
 def test_the_supports_damping_by_decrement_and_by_fit():
-    found, decay = support_damping(drops(), resolution=COUNT, test_mass=Quantity(MASS, 1e-4))
+    found, decay = support_damping(drops(), test_mass=Quantity(MASS, 1e-4))
     assert found.estimate.logarithmic
     assert abs(found.value - C_S) < 3.5 * found.uncertainty < 0.02
     ratio = found.others["damping_ratio"]
@@ -41,7 +41,7 @@ def test_the_supports_damping_by_decrement_and_by_fit():
 
 
 def test_the_test_masss_uncertainty_is_in_it():
-    wide = support_damping(drops(), resolution=COUNT, test_mass=Quantity(MASS, 0.05 * MASS))[0]
+    wide = support_damping(drops(), test_mass=Quantity(MASS, 0.05 * MASS))[0]
     assert wide.uncertainty / wide.value == pytest.approx(0.05, rel=0.02)
 
 
@@ -49,7 +49,7 @@ def test_the_decrements_error_is_that_of_a_mean_where_drops_differ():
     """Four supports that differ by more than their records' noise: standard deviation over the root of their number."""
     damped = np.array([0.56, 0.60, 0.62, 0.66])
     runs = [drops([0.011], c=c, seed=i, duration=5)[0] for i, c in enumerate(damped)]
-    found, decay = support_damping(runs, resolution=COUNT, test_mass=Quantity(MASS, 0.0))
+    found, decay = support_damping(runs, test_mass=Quantity(MASS, 0.0))
     assert decay.runs == tuple(run.name for run in runs) and any("no majority" in note for note in found.notes)
     assert found.uncertainty == pytest.approx(damped.std(ddof=1) / np.sqrt(4), rel=0.05)
 
@@ -57,7 +57,7 @@ def test_the_decrements_error_is_that_of_a_mean_where_drops_differ():
 def test_turning_points_lie_on_their_envelope():
     b, w = C_S / MASS, np.sqrt(STIFF / MASS)
     one = drops([0.011])[0]
-    t, height, error = log_decrement(one.time[60:], one.positions[60:], 0.0, resolution=COUNT)
+    t, height, error = log_decrement(Decay(one, 60, len(one.time)), 0.0)
     # at a turning point the envelope is the height itself, but for (b/2w)^2
     expected = 0.011 * np.exp(-b / 2 * (t - 0.5))
     assert len(t) > 60 and np.allclose(np.diff(t[:60]), np.pi / w, atol=1e-3)
@@ -67,7 +67,7 @@ def test_turning_points_lie_on_their_envelope():
 
 def test_a_drop_that_hardly_moves_is_refused():
     with pytest.raises(ValueError, match="drop it from higher|tap it harder"):
-        support_damping(drops([3e-4]), resolution=COUNT, test_mass=Quantity(MASS, 1e-3))
+        support_damping(drops([3e-4]), test_mass=Quantity(MASS, 1e-3))
 
 
 def test_heights_with_friction_follow_the_recursion():
@@ -106,7 +106,7 @@ def slipped(one, counts, at=2.0):
 
 
 def fitted(runs, **options):
-    return free_decay(runs, resolution=COUNT, **options)
+    return free_decay(runs, **options)
 
 
 @pytest.mark.parametrize("counts", [1, 20])
@@ -140,8 +140,8 @@ def test_one_tap_needs_no_other():
 def test_viscous_and_dry_are_told_apart():
     w, b, f, m = 4.5, 1.04, 0.012, 0.84
     runs = taps(w=w, b=b, f=f)
-    decay = free_decay(runs, resolution=COUNT)
-    found = decay_damping(decay, Quantity(m), resolution=COUNT)
+    decay = free_decay(runs)
+    found = decay_damping(decay, Quantity(m))
     assert abs(found.value - m * b) < 3.5 * found.uncertainty < 0.01
     assert abs(found.others["friction"].value - m * f) < 3.5 * found.others["friction"].uncertainty < 1e-3
     assert found.others["c_viscous_only"].value > 1.02 * m * b

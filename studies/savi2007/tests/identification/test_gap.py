@@ -7,6 +7,7 @@ import pytest
 from studies.savi2007.tests.identification import made
 from studies.savi2007.tests.identification.made import COUNT, counted, decay_of, driven, run, swinging
 
+from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.identification.grazing import _sensor_error, _unseen, grazing_gap
 from nonsmooth_savi2007.identification.referral import mean_of_drive, mean_shift
 from nonsmooth_savi2007.identification.response_fits import grazing_amplitude
@@ -44,7 +45,7 @@ def moved(length, ripple_part, zero, n=6, seed=0, cranks=(0.0165, 0.035)):
 
 
 def test_the_shift_is_that_of_string_and_ripple():
-    found = mean_shift(moved(0.7, 2e-3, 1e-4), 1e-4, 1e-7, string_length=0.705, string_error=0.005)
+    found = mean_shift(moved(0.7, 2e-3, 1e-4), 1e-4, 1e-7, string=Quantity(0.705, 0.005))
     value, error = found.at(0.039)
     assert abs(value - (0.039**2 / (8 * 0.7) + 2e-3 * 0.039)) < 3.5 * error < 2e-5
     assert found.runs == 12
@@ -53,7 +54,7 @@ def test_the_shift_is_that_of_string_and_ripple():
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_the_motors_side_is_read_off_the_runs_and_not_off_the_string(side):
-    found = mean_shift(moved(side * 0.7, 2e-3, 1e-4), 1e-4, 1e-6, string_length=0.705, string_error=0.005)
+    found = mean_shift(moved(side * 0.7, 2e-3, 1e-4), 1e-4, 1e-6, string=Quantity(0.705, 0.005))
     true = side * 0.039**2 / (8 * 0.7) + 2e-3 * 0.039
     value, error = found.at(0.039)
     assert found.side == side and abs(value - true) < 3.5 * error < 2e-5
@@ -66,7 +67,7 @@ def test_where_no_run_tells_the_side_the_shift_is_uncertain_by_it_and_that_is_sa
         (moved(0.7, 0, 0).only(False), "no run without the support tells"),
         (moved(side * 0.7, 1e-3, 0, cranks=(0.02,)), "the 6 runs without the support do not tell"),
     ):
-        found = mean_shift(seen, 0.0, 1e-6, string_length=0.7, string_error=0.005)
+        found = mean_shift(seen, 0.0, 1e-6, string=Quantity(0.7, 0.005))
         assert found.side == 0 and words in found.notes[0]
         value, error = found.at(0.039)
         assert abs(value - side * mean_of_drive(0.039, 0.7) / 2) < 2 * error
@@ -75,7 +76,7 @@ def test_where_no_run_tells_the_side_the_shift_is_uncertain_by_it_and_that_is_sa
 
 
 def test_a_string_that_the_runs_contradict_is_not_used_and_named():
-    found = mean_shift(moved(0.7, 0, 0), 0.0, 1e-6, string_length=1.4, string_error=0.005)
+    found = mean_shift(moved(0.7, 0, 0), 0.0, 1e-6, string=Quantity(1.4, 0.005))
     value, error = found.at(0.039)
     assert abs(value - mean_of_drive(0.039, 0.7) / 2) < 3.5 * error < 1e-5
     assert "the notebook 1.4 m" in found.notes[0] and "string_length is not used" in found.notes[0]
@@ -83,14 +84,12 @@ def test_a_string_that_the_runs_contradict_is_not_used_and_named():
 
 def test_rest_sensor_zero_and_mean_position_are_three_things():
     # zeroed 0.4 mm beside rest: the mean position in the sensor's count moves with it, the shift from rest does not
-    one, other = (
-        mean_shift(moved(0.7, 2e-3, rest), rest, 1e-6, string_length=0.7, string_error=0.005) for rest in (0.0, -4e-4)
-    )
+    one, other = (mean_shift(moved(0.7, 2e-3, rest), rest, 1e-6, string=Quantity(0.7, 0.005)) for rest in (0.0, -4e-4))
     assert other.rest == pytest.approx(-4e-4, abs=3e-6)
     assert other.at(0.039)[0] == pytest.approx(one.at(0.039)[0], abs=3 * one.at(0.039)[1])
     assert other.place(0.039)[0] - one.place(0.039)[0] == pytest.approx(-4e-4, abs=3e-6)
     # runs at two cranks and the string tell the place of rest too, where no tap does
-    without = mean_shift(moved(0.7, 2e-3, -4e-4), 0.0, 1e-3, string_length=0.7, string_error=0.005)
+    without = mean_shift(moved(0.7, 2e-3, -4e-4), 0.0, 1e-3, string=Quantity(0.7, 0.005))
     assert abs(without.rest + 4e-4) < 3 * np.sqrt(without.covariance[0, 0]) < 3e-4
 
 
@@ -104,7 +103,7 @@ def test_friction_moves_the_place_of_a_car_that_goes_longer_one_way():
     turned = steady([run("response", time, x, turns=np.arange(0, 12, 2 * np.pi / 5), crank_length=0.0165)])
     assert turned.lean[0] == pytest.approx(4 * a2 / (np.pi * a), rel=0.02)
     dry = 1e-3
-    still, held = (mean_shift(turned, 0.0, 1e-7, string_length=0.7, string_error=0.05, dry=d) for d in (0.0, dry))
+    still, held = (mean_shift(turned, 0.0, 1e-7, string=Quantity(0.7, 0.05), dry=d) for d in (0.0, dry))
     assert held.at(0.0165)[0] - still.at(0.0165)[0] == pytest.approx(dry * turned.lean[0], rel=0.05)
 
 
@@ -122,7 +121,7 @@ def stepping(gap, place=2e-5, crank=0.010, scale=1.0, order=-1, seed=1, mixed=Fa
 
 def test_the_graze_brackets_the_gap():
     gap = grazing_amplitude(8.43, 0.010, W, B, F)
-    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), kappa=KAPPA)
     low, high = found.interval(0.999)
     assert low < gap < high and high - low < 8e-5
     frequency = found.others["grazing_frequency"]
@@ -133,7 +132,7 @@ def test_the_graze_brackets_the_gap():
 
 def test_a_push_too_light_to_be_seen_widens_the_bracket():
     gap, crank = grazing_amplitude(8.43, 0.010, W, B, F), 0.010
-    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), kappa=KAPPA)
     a = [grazing_amplitude(w, crank, W, B, F) for w in (8.45, 8.40)]
     # the mean of a run is seen to 0.06 counts at best: by as much a car that goes p beyond the gap is pushed
     least = _unseen(0.06 * COUNT, a[0], KAPPA / W**2)
@@ -154,8 +153,8 @@ def test_the_push_of_a_light_contact_by_quadrature(depth):
 
 def test_the_sensors_error_is_that_of_a_mean_of_four():
     off = 1e-5 * np.array([1.0, -1.0, 2.0, -2.0, 1.0, -1.0])  # standard deviation sqrt(12/5) x 10 um
-    seen = SimpleNamespace(highest=2e-3 + off, mean=np.zeros(6), omega=np.full(6, 8.0))
-    error = _sensor_error(seen, np.ones(6, dtype=bool), lambda omega: np.full(len(omega), 2e-3), COUNT)
+    seen = SimpleNamespace(highest=2e-3 + off, mean=np.zeros(6), omega=np.full(6, 8.0), resolution=COUNT)
+    error = _sensor_error(seen, np.ones(6, dtype=bool), lambda omega: np.full(len(omega), 2e-3))
     assert error == pytest.approx(1e-5 * np.sqrt(12 / 5) / np.sqrt(4))
 
 
@@ -163,14 +162,14 @@ def test_a_gap_by_graze_is_neither_too_sure_nor_too_vague():
     z = []
     for seed in range(12):
         gap = grazing_amplitude(8.43 - 0.01 * (seed % 5), 0.010, W, B, F)
-        found = grazing_gap(stepping(gap, seed=seed), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+        found = grazing_gap(stepping(gap, seed=seed), decay_of(W, B, F, 1e-6), kappa=KAPPA)
         z.append((found.value - gap) / found.uncertainty)
     assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.6
 
 
 def test_the_cranks_length_need_not_be_right():
     gap = 1.004 * grazing_amplitude(8.43, 0.010, W, B, F)
-    found = grazing_gap(stepping(gap, scale=1.004), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
+    found = grazing_gap(stepping(gap, scale=1.004), decay_of(W, B, F), kappa=KAPPA)
     low, high = found.interval(0.999)
     assert low < gap < high
 
@@ -188,7 +187,7 @@ def test_the_cranks_length_need_not_be_right():
 def test_what_does_not_show_a_graze_is_refused(runs, said):
     gap = grazing_amplitude(8.43, 0.010, W, B, F)
     with pytest.raises(ValueError, match=said):
-        grazing_gap(runs(gap), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
+        grazing_gap(runs(gap), decay_of(W, B, F), kappa=KAPPA)
 
 
 def early(omega, crank=0.006):
@@ -204,7 +203,7 @@ def early(omega, crank=0.006):
 @pytest.mark.parametrize("omega", [7.6, 7.4])
 def test_contact_that_a_transient_begins_early_is_in_the_uncertainty(omega):
     decay = decay_of(made.W, made.B, made.F, made.PLACE)
-    found = grazing_gap(early(omega), decay, resolution=COUNT, kappa=made.KAPPA)
+    found = grazing_gap(early(omega), decay, kappa=made.KAPPA)
     true = made.GAP - made.PLACE
     free = grazing_amplitude(omega, 0.006, made.W, made.B, made.F)
     assert true - free > 4e-5  # the free motion does not reach the support
@@ -216,4 +215,4 @@ def test_contact_that_a_transient_begins_early_is_in_the_uncertainty(omega):
 def test_steps_at_two_settings_of_the_screw_are_refused():
     runs = [*early(7.4)[:-1], driven(7.35, 0.006, duration=32.0, transient=20.0, gap=0.0019)]
     with pytest.raises(ValueError, match=r"readings of \[0.0018, 0.0019\] m at the screw: give one of them at a time"):
-        grazing_gap(runs, decay_of(made.W, made.B, made.F), resolution=COUNT, kappa=made.KAPPA)
+        grazing_gap(runs, decay_of(made.W, made.B, made.F), kappa=made.KAPPA)

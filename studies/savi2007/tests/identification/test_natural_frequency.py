@@ -61,7 +61,7 @@ def test_the_decay_is_not_bound_to_the_grid():
     for i, v in enumerate((0.5, -0.5, 0.3, -0.3)):
         time, x = decaying(w, b, 0.0, v, rng=rng)
         runs.append(run("impulse", time, counted(x), name=f"Run #{i + 1}"))
-    decay = free_decay(runs, resolution=COUNT)
+    decay = free_decay(runs)
     found = natural_frequency(decay)
     assert abs(found.value - w) < 3.5 * found.uncertainty < 0.004
     grid, undamped = found.others["dft_grid"], found.others["dft_undamped"]

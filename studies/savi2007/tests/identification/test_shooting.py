@@ -21,7 +21,7 @@ def viscous(w, b, height, rng):
 
 def test_free_decay_finds_frequency_and_damping_of_the_closed_form():
     rng, w, b = np.random.default_rng(0), 4.5, 1.04
-    found = free_decay([viscous(w, b, h, rng) for h in (0.11, -0.11, 0.08, -0.08)], resolution=COUNT)
+    found = free_decay([viscous(w, b, h, rng) for h in (0.11, -0.11, 0.08, -0.08)])
     error = np.sqrt(np.diag(found.covariance))
     assert np.all(np.abs(found.values - [w, b, 0.0, 0.0]) < 3.5 * error)
     assert error[0] < 1e-3 and error[1] < 1e-3
@@ -42,18 +42,18 @@ def test_free_decay_tells_viscous_damping_from_dry_friction():
         )
         x = np.where(at > 0, solved.sol(np.maximum(at, 0))[0], 0.0)
         runs.append(run("impulse", time, COUNT * np.rint(x / COUNT)))
-    found = free_decay(runs, resolution=COUNT)
+    found = free_decay(runs)
     error = np.sqrt(np.diag(found.covariance))
     assert np.all(np.abs(found.values - [w, b, f, 0.0]) < 3.5 * error)
     assert error[1] < 0.002 * b and error[2] < 0.02 * f
     # without friction in the law the damper would take it over
-    assert free_decay(runs, resolution=COUNT, friction=False).values[1] > 1.03 * b
+    assert free_decay(runs, friction=False).values[1] > 1.03 * b
 
 
 def test_a_record_without_a_tap_is_refused():
     time = np.arange(0, 5, 0.01)
     with pytest.raises(ValueError, match="tap it harder"):
-        swing(time, np.zeros(len(time)), resolution=COUNT)
+        swing(run("impulse", time, np.zeros(len(time))))
 
 
 @pytest.mark.slow

@@ -1,8 +1,10 @@
 """Stiffness from pulls whose law is known: the slope without inertia, friction and gain."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from studies.savi2007.tests.identification.made import COUNT, counted, run
+from studies.savi2007.tests.identification.made import counted, run
 
 from nonsmooth_savi2007.identification.stiffness import stiffness
 
@@ -25,7 +27,7 @@ def pulls(gain=1.0, n=4, duration=30.0, reach=0.1, seed=0):
 
 
 def test_the_slope_is_that_of_the_spring_and_friction_that_of_the_loop():
-    found = stiffness(pulls(), resolution=COUNT, mass=M, gain_limit=0.01)
+    found = stiffness(pulls(), mass=M, gain_limit=0.01)
     alone = found.others["slope_a"]
     assert abs(alone.value - S) < 3.5 * alone.uncertainty < 0.003 * S
     dry = found.others["friction_force"]
@@ -35,12 +37,12 @@ def test_the_slope_is_that_of_the_spring_and_friction_that_of_the_loop():
 
 def test_inertia_left_in_takes_m_w_squared_off():
     # sin^2(pi t/T): a = -(2 pi/T)^2 (x - far/2)
-    bare = stiffness(pulls(), resolution=COUNT, mass=0.0, gain_limit=0.01).others["slope_a"]
+    bare = stiffness(pulls(), mass=0.0, gain_limit=0.01).others["slope_a"]
     assert bare.value == pytest.approx(S - M * (2 * np.pi / 30) ** 2, abs=4 * bare.uncertainty)
 
 
 def test_a_gain_is_stated_as_type_b_and_shows_in_no_scatter():
-    high = stiffness(pulls(gain=1.009), resolution=COUNT, mass=M, gain_limit=0.01)
+    high = stiffness(pulls(gain=1.009), mass=M, gain_limit=0.01)
     alone = high.others["slope_a"]
     assert alone.value == pytest.approx(1.009 * S, abs=4 * alone.uncertainty)
     assert high.estimate.half_width == pytest.approx(0.01 * high.value)
@@ -52,11 +54,11 @@ def test_a_gain_is_stated_as_type_b_and_shows_in_no_scatter():
 def test_what_cannot_be_used_is_refused_with_the_run_and_what_to_do():
     good = pulls(n=1)[0]
     other = run("springs", good.time, good.positions, force=np.zeros(len(good.time)))
-    shifted = type(good)(good.procedure, "Run #7", {}, good.x, other.force.assign_coords(time=good.time + 0.5))
+    shifted = replace(good, name="Run #7", force=other.force.assign_coords(time=good.time + 0.5))
     with pytest.raises(ValueError, match=r"springs Run #7: .*not over the same times; record both at one rate"):
-        stiffness([shifted], resolution=COUNT, mass=M)
+        stiffness([shifted], mass=M)
     with pytest.raises(ValueError, match="less than 50 counts in all runs; pull farther"):
-        stiffness(pulls(reach=0.001, n=2), resolution=COUNT, friction=False)
+        stiffness(pulls(reach=0.001, n=2), friction=False)
     creeping = run("springs", good.time, counted(1e-4 * good.time), force=np.zeros(len(good.time)))
     with pytest.raises(ValueError, match=r"springs Run #1, channel 'Angle': the hand moves faster than 3 mm/s in"):
-        stiffness([creeping], resolution=COUNT, mass=M)
+        stiffness([creeping], mass=M)

@@ -316,7 +316,7 @@ def test_figure_14_is_recorded_from_several_places() -> None:
 def test_a_release_begins_where_it_says_and_the_next_run_goes_on_where_motion_is_carried(carry: bool) -> None:
     """No waiting, a motor hardly driving, no support: the car swings freely from where it was let go."""
     rig = VirtualRig.published(friction=False, quantisation=False, jitter=False, ripple=False)
-    settings = [SteadyRun(4.0, 0.0, None, 1.0, (), -0.03), SteadyRun(4.0, 0.0, None, 1.0)]
+    settings = [SteadyRun(4.0, 0.0, None, 1.0, {}, -0.03), SteadyRun(4.0, 0.0, None, 1.0)]
     made = records(rig, "response", settings, settle=1e-9, carry=carry)
     p, period = rig.truth, 2 * np.pi / frequency(rig, 4.0)
     decay, natural = p["c"] / (2 * p["m"]), np.sqrt(2 * p["k"] / p["m"])
@@ -397,14 +397,14 @@ def test_a_motor_that_wanders_turns_by_its_own_angle() -> None:
     """The gate sees whole turns of the angle that drives the car; its frequency varies by 0.1 % about the mean."""
     rig, omega = VirtualRig(2, truth={"motor_wander": 1e-3}), 6.0
     wander = rig.wander("response", 0, omega)
-    at = passages(rig, omega, 3.0, 4000.0, wander)
-    turned = crank_angle(at, rig.named_parameters(omega=omega), wander) / (2 * np.pi)
+    at = passages(rig, omega, 3.0, 4000.0, **wander)
+    turned = crank_angle(at, rig.named_parameters(omega=omega, **wander), True) / (2 * np.pi)
     np.testing.assert_allclose(turned, np.rint(turned), atol=1e-10)
     assert np.all(np.diff(np.rint(turned)) == 1)
     instants = np.linspace(0, 4000, 400_001)
-    rate = np.gradient(crank_angle(instants, rig.named_parameters(omega=omega, ripple=0.0), wander), instants)
+    rate = np.gradient(crank_angle(instants, rig.named_parameters(omega=omega, ripple=0.0, **wander), True), instants)
     assert np.std(rate) / omega == pytest.approx(1e-3, rel=0.05) and np.mean(rate) == pytest.approx(omega, rel=1e-4)
-    assert rig.wander("response", 1, omega) != wander and VirtualRig(2).wander("response", 0, omega) == ()
+    assert rig.wander("response", 1, omega) != wander and VirtualRig(2).wander("response", 0, omega) == {}
 
 
 def test_one_tap_slips_and_the_others_do_not() -> None:

@@ -1,4 +1,4 @@
-"""Dry friction with sticking."""
+"""Dry friction with sticking: by a normal force that is given, or under the force of a rigid stop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,35 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coulomb(Element):
+class Friction(Element):
+    """The ground of all friction: it holds a relative speed at zero, or slips one way or the other."""
+
+    speed: Callable[..., Any] | None = None
+    belt: Law = 0.0
+    friction: Law = 0.0
+
+    kinematics = "speed"
+    held = ("stick",)
+    sides = ("forward", "back")
+
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        return v - law(self.belt)
+
+    def rate(self, here: Place) -> Any:
+        return here.where
+
+    def pull(self, here: Place) -> Any:
+        return -here.where
+
+    def lies(self, where: float, rate: float, slow: float) -> int:
+        return int(np.sign(rate))
+
+    def meeting(self, here: Place) -> list[list[Condition]]:
+        return [[Condition(here.where, -here.side, "speed")]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coulomb(Friction):
     r"""Dry friction with sticking: F = -f(v) sgn v while it slips, what holds v = 0 while it sticks.
 
     It sticks as long as the force that holds it stays below ``static``; Stribeck curves are functions ``friction(v)``
@@ -39,13 +67,9 @@ class Coulomb(Element):
         See :class:`Element`.
     """
 
-    speed: Callable[..., Any] | None = None
-    belt: Law = 0.0
-    friction: Law = 0.0
     static: Law | None = None
     normal: Law | None = None
 
-    kinematics = "speed"
     phases = ("stick", "forward", "back")
     laws = ("friction", "static", "normal")
     conditions = (
@@ -57,11 +81,6 @@ class Coulomb(Element):
         "turned_forward",
         "turned_back",
     )
-    held = ("stick",)
-    sides = ("forward", "back")
-
-    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        return v - law(self.belt)
 
     def needs(self, others: Collection[str]) -> list[tuple[str, int | None]]:
         sides = (1, -1, 0) if self.static is None else (1, -1)
@@ -84,14 +103,8 @@ class Coulomb(Element):
             rows.append((static - kinetic, less))
         return rows
 
-    def rate(self, here: Place) -> Any:
-        return here.where
-
-    def pull(self, here: Place) -> Any:
-        return -here.where
-
     def force(self, here: Place) -> Any:
-        side = 1 if here.phase == "forward" else -1
+        side = here.side
         return -side * here.law("friction", side) * self.pressure(here)
 
     def pressure(self, here: Place) -> Any:
@@ -114,15 +127,10 @@ class Coulomb(Element):
         static = here.law("friction", 0) if self.static is None else here.law("static")
         return static * self.pressure(here)
 
-    def lies(self, where: float, rate: float, slow: float) -> int:
-        return int(np.sign(rate))
-
-    def meeting(self, here: Place) -> list[list[Condition]]:
-        return [[Condition(here.where, -1 if here.phase == "forward" else 1, "speed")]]
-
     def leaving(self, here: Place) -> list[Leaving]:
         v, hold, most = here.where, here.put("stick").holding(), self.most(here)
         over, under = hold - most, hold + most
+        torn_back, torn_forward = Condition(over, 1, "over"), Condition(under, -1, "under")
         if here.phase == "stick":
             off = SMALL * here.size(v)
             begins = (
@@ -133,14 +141,12 @@ class Coulomb(Element):
                 if here.begins_alone()
                 else []
             )
-            ends = Condition(over, 1, "over"), Condition(under, -1, "under")
-            return [*begins, Leaving("back", [ends[0]]), Leaving("forward", [ends[1]])]
-        other, sign = ("back", -1) if here.phase == "forward" else ("forward", 1)
+            return [*begins, Leaving("back", [torn_back]), Leaving("forward", [torn_forward])]
+        other, sign, torn = ("back", -1, torn_back) if here.side > 0 else ("forward", 1, torn_forward)
         stopped = Condition(v, sign, "speed")
         if here.vanishes(most):
             return [Leaving(other, [stopped])]  # an open contact, which bears no friction
         within = [Condition(over, -1, "over"), Condition(under, 1, "under")]
-        torn = Condition(over, 1, "over") if here.phase == "forward" else Condition(under, -1, "under")
         still = here.struck(0)
         tie = Leaving("stick", [stopped], still)  # a load as large as the friction, to all orders: it holds
         if not here.is_turned():

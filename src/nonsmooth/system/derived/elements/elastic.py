@@ -97,7 +97,7 @@ class Backlash(Displaced):
     damping: Law = 0.0
 
     phases = ("free", "above", "below")
-    touching = ("above", "below")
+    touching = sides = ("above", "below")
     laws = ("half_width", "stiffness", "damping")
     conditions = ("upper", "lower")
 
@@ -105,9 +105,9 @@ class Backlash(Displaced):
         return [(here.law("half_width"), f"the half width of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:
-        if here.phase == "free":
+        side = here.side
+        if not side:
             return 0
-        side = 1 if here.phase == "above" else -1
         pressed = here.where - side * here.law("half_width")
         return -here.law("stiffness") * pressed + damped(here)
 
@@ -118,7 +118,7 @@ class Backlash(Displaced):
                 Leaving("above", [Condition(upper, 1, "upper")]),
                 Leaving("below", [Condition(lower, -1, "lower")]),
             ]
-        back = Condition(upper, -1, "upper") if here.phase == "above" else Condition(lower, 1, "lower")
+        back = Condition(upper, -1, "upper") if here.side > 0 else Condition(lower, 1, "lower")
         return [Leaving("free", [back])]
 
 
@@ -151,14 +151,14 @@ class PreloadedSpring(Displaced):
         return [(here.law("preload"), f"the preload of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:
-        side = 1 if here.phase == "above" else -1
+        side = here.side
         return -side * here.law("preload") - here.law("stiffness") * here.where
 
     def most(self, here: Place) -> Any:
         return here.law("preload")
 
     def meeting(self, here: Place) -> list[list[Condition]]:
-        return [[Condition(here.where, -1 if here.phase == "above" else 1, "side")]]
+        return [[Condition(here.where, -here.side, "side")]]
 
     def lies(self, where: float, rate: float, slow: float) -> int:
         return int(np.sign(where) if where else np.sign(rate) if abs(rate) > slow else 0)
@@ -168,7 +168,7 @@ class PreloadedSpring(Displaced):
         over, under = Condition(hold - most, 1, "over"), Condition(hold + most, -1, "under")
         if here.phase == "held":
             return [Leaving("below", [over]), Leaving("above", [under])]
-        to, sign = ("below", -1) if here.phase == "above" else ("above", 1)
+        to, sign = ("below", -1) if here.side > 0 else ("above", 1)
         side, rate = Condition(here.where, sign, "side"), here.rate()
         fast = Condition(rate - sign * self.slow * here.size(rate), sign, "fast")
         crossed = [Leaving(to, [side, one]) for one in (fast, over, under)]

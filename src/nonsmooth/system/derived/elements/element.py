@@ -75,7 +75,7 @@ class Element(ABC):
     drives: ClassVar[str] = "drives its speed up"  # a positive force
     slow: ClassVar[float] = SLOW  # of the scale of its rate: below it it may hold, where a place decides
     presses: ClassVar[bool] = False  # its law is a normal force for friction
-    given: ClassVar[Any] = None  # on an element that stands for one with ``at``: that one
+    given: ClassVar[Any] = None  # on an element that stands for one with ``at``: that one; of a text: its own text
 
     def __post_init__(self) -> None:
         label = type(self).__name__
@@ -203,7 +203,7 @@ class Place:
 
     @property
     def side(self) -> int:
-        """1 where it slips forward, -1 back, else 0."""
+        """1 where it is in the first of its ``sides``, -1 in the second, else 0."""
         sides = self.element.sides
         return (self.phase == sides[0]) - (self.phase == sides[1])
 
@@ -229,14 +229,10 @@ class Place:
         pattern = (*self.pattern[: self.k], self.element.phases.index(phase), *self.pattern[self.k + 1 :])
         return Place(self.make, self.k, self.mode, pattern)
 
-    def other(self, j: int) -> Place:
-        """The place of another element in the same combination."""
-        return Place(self.make, j, self.mode, self.pattern)
-
     def named(self, name: Any) -> Place | None:
         """That of an element by its name; None where there is none."""
         found = [j for j, part in enumerate(self.make.parts) if part.name == name]
-        return self.other(found[0]) if found else None
+        return self.make.place(found[0], self.mode, self.pattern) if found else None
 
     def holding(self) -> Any:
         """The force of the element."""

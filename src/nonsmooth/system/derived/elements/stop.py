@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived.elements.coulomb import Friction
 from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
@@ -153,35 +152,17 @@ RUBS = "_friction"  # ends its name, behind that of the stop
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rubbing(Element):
+class Rubbing(Friction):
     """Coulomb's friction under the force of a rigid stop: |lambda_t| <= mu lambda_n, of which none is given.
 
     While the stop is closed and it slips, its force is -mu sgn v times that of the stop; while the stop is open it is
     free. What it does is always decided together with the stop (:mod:`nonsmooth.system.derived.deciding`)."""
 
     of: str = ""  # the stop
-    speed: Callable[..., Any] | None = None
-    belt: Law = 0.0
-    friction: Law = 0.0
 
-    kinematics = "speed"
     phases = ("free", "stick", "forward", "back")
     laws = ("friction",)
     conditions = ("speed", "over", "under")
-    held = ("stick",)
-    sides = ("forward", "back")
-
-    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        return v - law(self.belt)
-
-    def needs(self, others: Collection[str]) -> list[tuple[str, int | None]]:
-        return [("friction", None)]
-
-    def rate(self, here: Place) -> Any:
-        return here.where
-
-    def pull(self, here: Place) -> Any:
-        return -here.where
 
     def force(self, here: Place) -> Any:
         """None of its own: what it adds comes with the force of the stop."""
@@ -191,13 +172,8 @@ class Rubbing(Element):
         """The coefficient of friction, which no force is measured by without that of the stop."""
         return here.law("friction")
 
-    def lies(self, where: float, rate: float, slow: float) -> int:
-        return int(np.sign(rate))
-
     def meeting(self, here: Place) -> list[list[Condition]]:
-        if here.phase == "free":
-            return []
-        return [[Condition(here.where, -1 if here.phase == "forward" else 1, "speed")]]
+        return [] if here.phase == "free" else super().meeting(here)
 
     def leaving(self, here: Place) -> list[Leaving]:
         return here.make.asked(here.k, here.mode, here.pattern)

@@ -21,9 +21,9 @@ from nonsmooth_savi2007.claims.verdicts import (
     of_both,
     printed_cell,
 )
-from nonsmooth_savi2007.figures.amplitude import flip_of, rate_of, slowest
+from nonsmooth_savi2007.figures.attractor import PHASES
 from nonsmooth_savi2007.figures.coexisting import names_of
-from nonsmooth_savi2007.figures.gap import PHASES
+from nonsmooth_savi2007.figures.measured_diagrams import flip_of, rate_of, slowest
 from nonsmooth_savi2007.grazing import free_amplitude
 from nonsmooth_savi2007.measure import (
     APERIODIC,
@@ -57,13 +57,12 @@ def f11(data: Data) -> Iterator[Statement]:
         found = [highest(changes(one, n, 2 * n, "up")) for one in swept]
         beyond = found[0] is not None and found[0].high < printed.value
         words = f"{late if beyond else ''} {why}".strip()
-        yield against_printed("F11", f"{says} {printed}", printed, found, words).measured(cell)
+        yield against_printed(f"{says} {printed}", printed, found, words).measured(cell)
     edges = [_chaos_from(one) for one in swept]
     values, regime = regimes(swept[0], "up")
     inside = regime[values <= edges[0].high] if edges[0] is not None else regime[:0]
     windows = sorted({int(n) for n in inside if n > 0})
     yield against_printed(
-        "F11",
         f"chaos for rho of at most {printed}",
         printed,
         edges,
@@ -79,7 +78,7 @@ def _chaos_from(swept: xr.Dataset) -> Interval | None:
         return None
     values, regime = regimes(swept, "up")
     above = values[(values > found[1]) & (regime != UNSETTLED)]
-    return Interval(found[1], float(above[0])) if len(above) else None
+    return Interval(found[1], above[0]) if len(above) else None
 
 
 def _hysteresis(swept: xr.Dataset) -> str:
@@ -122,8 +121,8 @@ def _below(rise: xr.Dataset, end: float, words: str) -> Cell:
     if not len(numbers):
         return Cell(f"no turn below {words}")
     kinds, counts = np.unique(numbers, return_counts=True)
-    kind, share = int(kinds[counts.argmax()]), float(counts.max() / counts.sum())
-    return Cell(f"{period_word(kind)} in {100 * share:.0f} % of the turns below {words}", agreed(kind == APERIODIC))
+    kind, share = int(kinds[counts.argmax()]), 100 * counts.max() / counts.sum()
+    return Cell(f"{period_word(kind)} in {share:.0f} % of the turns below {words}", agreed(kind == APERIODIC))
 
 
 def f13(data: Data) -> Iterator[Statement]:
@@ -143,7 +142,6 @@ def f13(data: Data) -> Iterator[Statement]:
     several = sum(len(set(one)) > 1 for one in numbers.values())
     starts = max(map(len, numbers.values()))
     yield of_both(
-        "F13",
         "Section 4, on Fig. 13",
         "periodic and chaotic responses as the gap varies",
         texts,
@@ -156,7 +154,6 @@ def f13(data: Data) -> Iterator[Statement]:
         )
     )
     yield of_both(
-        "F13",
         "not in the paper",
         "coexisting motions (several starts)",
         others,
@@ -195,7 +192,6 @@ def f15(data: Data) -> Iterator[Statement]:
         distance, _ = cKDTree(exact / size).query(smoothed / size)
         worst = max(worst, np.quantile(distance, 0.99))
     yield of_both(
-        "F15",
         "Fig. 15",
         "g = 0.0018 m: a strange attractor, sections at four phases",
         (
@@ -214,7 +210,6 @@ def f16(data: Data) -> Iterator[Statement]:
     ratio = result["energy_distance_matched"].values / result["measured_halves_p95"].values
     number = int(result["measured_period_number"])
     yield Statement(
-        "F16",
         "Fig. 16",
         "the same attractor from the apparatus, at four phases",
         "see F15",
@@ -244,7 +239,6 @@ def f17(data: Data) -> Iterator[Statement]:
         number, touches = int(near["period_number"]), bool(near["contact"])
         text = f"{period_word(number)}, {'contact' if touches else 'no contact'} (at {float(near['value']):.3f} rad/s)"
         yield of_both(
-            "F17",
             "Section 4, on Fig. 17",
             f"omega = {omega:g} rad/s: {says}",
             texts,
@@ -288,26 +282,19 @@ def _abrupt(data: Mapping[str, xr.Dataset]) -> Statement:
             f"into chaos by period doublings from {first.value:.3f} to {rising[0]:.3f} rad/s; out of it at once, "
             f"rising after {rising[1]:.4f}, falling into it at {falling[1]:.4f} rad/s"
         )
+    short, long = (data[f"exact_{word}"] for word in ("short", "long"))  # how long chaos lasts just above grazing
+    omega = float(short["omega"][0])
+    left = [periods_reached(survey, omega).get(APERIODIC, 0) for survey in (short, long)]
     return of_both(
-        "F17",
         "Section 4, on Fig. 17",
         "abrupt transitions from periodic to chaotic and from chaotic to periodic",
         texts,
         "one of two is abrupt",
         Verdict.DIFFERS if "not found" in texts else Verdict.IN_PART,
-        f"{_lasting(data)} The other is a cascade of flips that looks abrupt on the scale of the figure.",
-    )
-
-
-def _lasting(data: Mapping[str, xr.Dataset]) -> str:
-    """Duration of chaos just above grazing."""
-    short, long = (data[f"exact_{word}"] for word in ("short", "long"))
-    omega = float(short["omega"][0])
-    left = [periods_reached(survey, omega).get(APERIODIC, 0) for survey in (short, long)]
-    return (
         "The transition at the higher frequency is abrupt. Above grazing chaos is a transient, which looks like "
         f"hysteresis: at {omega:g} rad/s {left[0]} of {short.sizes['start']} starts have no period after "
-        f"{short.attrs['transient']} periods, {left[1]} after {long.attrs['transient']}."
+        f"{short.attrs['transient']} periods, {left[1]} after {long.attrs['transient']}. The other is a cascade of "
+        "flips that looks abrupt on the scale of the figure.",
     )
 
 
@@ -330,23 +317,21 @@ def f17_grazing(data: Data) -> Iterator[Statement]:
     """Falling frequency: motion without contact ends, in chaos, where it grazes."""
     both = [data["fig17"][flow] for flow in FLOWS]
     met = [highest(changes(one, 1, APERIODIC, "down")) for one in both]
-    yield against_grazing("F17", "the abrupt transition is grazing (falling)", both, -1, met).measured(
+    yield against_grazing("the abrupt transition is grazing (falling)", both, -1, met).measured(
         Cell("not recorded with falling frequency")
     )
 
 
-def f13_basins(data: Data) -> Iterator[Statement]:
-    """Attractors at g = 0.0014 m with their shares."""
-    yield _basins(data["basins13"], "F13", "Fig. 14(c)", "g = 0.0014 m: period 3", 3)
+#: Where basins were computed: the place of the motion that the paper shows there, what it is, and its period number.
+_BASINS = {
+    "basins13": ("Fig. 14(c)", "g = 0.0014 m: period 3", 3),
+    "basins17": ("Fig. 18(b)", "omega = 9.55 rad/s: chaotic", APERIODIC),
+}
 
 
-def f17_basins(data: Data) -> Iterator[Statement]:
-    """Attractors at omega = 9.55 rad/s with their shares."""
-    yield _basins(data["basins17"], "F17", "Fig. 18(b)", "omega = 9.55 rad/s: chaotic", APERIODIC)
-
-
-def _basins(data: Mapping[str, xr.Dataset], claim: str, place: str, says: str, period: int) -> Statement:
-    found = data["basins"]
+def attractors(data: Data, name: str) -> Iterator[Statement]:
+    """Attractors beside one that the paper shows, with their shares."""
+    found, (place, says, period) = data[name]["basins"], _BASINS[name]
     names = names_of(found)
     periods = found["period_number"].values.tolist()
     alone = len(names) == 1
@@ -356,8 +341,7 @@ def _basins(data: Mapping[str, xr.Dataset], claim: str, place: str, says: str, p
         for name in label.dims
     )
     others = ", ".join(name for name, number in zip(names, periods, strict=True) if number != period)
-    return Statement(
-        claim,
+    yield Statement(
         place,
         says,
         f"attractors of {label.size} starts: {'; '.join(names)}; none reached by {int((label.values < 0).sum())}",

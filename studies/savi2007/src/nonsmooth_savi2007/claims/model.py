@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
 
 from nonsmooth_savi2007.claims.response import grazing_cell
 from nonsmooth_savi2007.claims.verdicts import CLOSE, FLOWS, Cell, Data, Statement, Verdict, agreed, judge_step, of_both
-from nonsmooth_savi2007.figures.amplitude import slowest
 from nonsmooth_savi2007.figures.band import FITTED, order_in_eta
+from nonsmooth_savi2007.figures.measured_diagrams import slowest
 from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.flows import ETA
 from nonsmooth_savi2007.measure import APERIODIC, jumps, main_jump, regimes, separation_rate, small_jump
@@ -28,13 +28,12 @@ def m1(data: Data) -> Iterator[Statement]:
     texts, pulls = [], []
     for flow in FLOWS:
         force = np.concatenate([orbit["contact_force"].values for orbit in _orbits(data, flow)])
-        peak, push = float(force.min()), float(force.max())
+        peak, push = force.min(), force.max()
         pulls.append(push / -peak)
         texts.append(f"force from {peak:.3f} to {push:.0e} N")
     p = _orbits(data, "exact")[0]
     stated, printed_formula = (float(np.sqrt(n * p["k"] / p["m"])) for n in (2, 1))
     yield of_both(
-        "M1",
         "Eqs. 1-2",
         "two modes; the support's force f_s < 0 in contact, and zero at release",
         texts,
@@ -46,8 +45,26 @@ def m1(data: Data) -> Iterator[Statement]:
     )
 
 
-def _in_regions(data: Data, flow: str) -> tuple[int, int]:
-    """Samples of a flow whose mode is the region of their state (Eqs. 3-5; smoothed, Eqs. 9-10), and samples in all."""
+#: Of each flow: the place, the statement, the regions, and what is to be said of the check.
+_REGIONS = {
+    "exact": (
+        "Eqs. 3-5, Fig. 2a",
+        "in contact exactly where h_a > 0 and h_b < 0",
+        "region",
+        "The mode is stored and changed by transitions, not computed from the state: this is a check.",
+    ),
+    "smoothed": (
+        "Eqs. 6-10, Fig. 2b",
+        "smoothed: bands of half width eta, S_a and S_b, between G- and G+",
+        "region of Eqs. 9-10",
+        "S_a holds the velocity at its entry (Eq. 8a) as memory. Eq. 8a interpolates the forces at the band's "
+        "ends; it is not the (1 - q) f- + q f+ of the text above it.",
+    ),
+}
+
+
+def in_regions(data: Data, flow: str) -> Iterator[Statement]:
+    """The mode of a flow is the region of the state (Eqs. 3-5; smoothed, Eqs. 9-10)."""
     right = total = 0
     for orbit in _orbits(data, flow):
         x, v = (orbit["u"].sel(state=name).values for name in "xv")
@@ -62,38 +79,10 @@ def _in_regions(data: Data, flow: str) -> tuple[int, int]:
         clear = (np.abs(edges) > ON_A_BORDER).all(axis=0)
         right += int((region == orbit["mode"].values)[clear].sum())
         total += int(clear.sum())
-    return right, total
-
-
-def m2(data: Data) -> Iterator[Statement]:
-    """The mode of the exact flow is the region of the state."""
-    right, total = _in_regions(data, "exact")
-    yield Statement(
-        "M2",
-        "Eqs. 3-5, Fig. 2a",
-        "in contact exactly where h_a > 0 and h_b < 0",
-        f"mode = region at {right} of {total} samples",
-        "see M3",
-        "none",
-        agreed(right == total),
-        "The mode is stored and changed by transitions, not computed from the state: this is a check.",
-    )
-
-
-def m3(data: Data) -> Iterator[Statement]:
-    """The mode of the smoothed model is the region of Eqs. 9-10."""
-    right, total = _in_regions(data, "smoothed")
-    yield Statement(
-        "M3",
-        "Eqs. 6-10, Fig. 2b",
-        "smoothed: bands of half width eta, S_a and S_b, between G- and G+",
-        "see M2",
-        f"mode = region of Eqs. 9-10 at {right} of {total} samples",
-        "none",
-        agreed(right == total),
-        "S_a holds the velocity at its entry (Eq. 8a) as memory. Eq. 8a interpolates the forces at the band's "
-        "ends; it is not the (1 - q) f- + q f+ of the text above it.",
-    )
+    place, says, regions, why = _REGIONS[flow]
+    found = f"mode = {regions} at {right} of {total} samples"
+    texts = (found, "see M3") if flow == "exact" else ("see M2", found)
+    yield of_both(place, says, texts, "none", agreed(right == total), why)
 
 
 def m4(data: Data) -> Iterator[Statement]:
@@ -106,7 +95,6 @@ def m4(data: Data) -> Iterator[Statement]:
     shift, closed = (float(moved[name] - grazing["closed_form"][0]) for name in ("grazing", "closed_form"))
     narrow = float(grazing["grazing"][0] - grazing["closed_form"][0])
     yield Statement(
-        "M4",
         "Section 4",
         "Runge-Kutta-Fehlberg with eta = 1e-5 in all simulations",
         "reference",
@@ -116,7 +104,6 @@ def m4(data: Data) -> Iterator[Statement]:
         "The paper names no tolerance; rtol 1e-6 here. On orbits that cross transversally.",
     )
     yield Statement(
-        "M4",
         "Section 4",
         "the choice of eta is important",
         "reference",
@@ -128,7 +115,6 @@ def m4(data: Data) -> Iterator[Statement]:
         "Away from grazing it matters little: a tenth of the band makes a hundredth of the error.",
     )
     yield Statement(
-        "M4",
         "closed form, not printed",
         f"near grazing contact begins at g - eta: Fig. 9's falling jump moves by {closed:+.2e} rad/s at eta = 1e-5",
         f"{narrow:+.1e} rad/s off the closed form of g",
@@ -139,17 +125,21 @@ def m4(data: Data) -> Iterator[Statement]:
     )
 
 
-def _jumps(ninth: xr.Dataset, tenth: xr.Dataset) -> int:
+#: Jumps of Figs. 9 (0) and 10 (1) at grazing: which jump, with which direction, at which of the grazing frequencies.
+_AT_GRAZING = ((0, main_jump, "down", -1), (1, main_jump, "down", -1), (1, small_jump, "up", 0))
+
+
+def _jumps(both: Sequence[xr.Dataset]) -> int:
     """Number of jumps in Figs. 9 and 10."""
-    return sum(len(jumps(one, direction)) for one in (ninth, tenth) for direction in ("up", "down"))
+    return sum(len(jumps(one, direction)) for one in both for direction in ("up", "down"))
 
 
 def c1(data: Data) -> Iterator[Statement]:
     """Jumps, bifurcations, chaos; abrupt changes by grazing."""
     texts, seen, at_grazing = [], [], []
     for flow in FLOWS:
-        ninth, tenth = data["fig09"][flow], data["fig10"][flow]
-        met = _jumps(ninth, tenth)
+        both = [data[name][flow] for name in ("fig09", "fig10")]
+        met = _jumps(both)
         periods = sorted({int(n) for n in np.unique(regimes(data["fig11"][flow], "up")[1]) if n > 0})
         rate, error = separation_rate(data["fig15"][f"{flow}_twins"])
         texts.append(
@@ -157,21 +147,15 @@ def c1(data: Data) -> Iterator[Statement]:
             f"separate by a factor exp({rate:.2f} ± {error:.2f}) per period in Fig. 15"
         )
         seen.append(met > 0 and len(periods) > 1 and rate > 5 * error)
-        pairs = [(main_jump(one, "down"), grazing_of(one)[-1]) for one in (ninth, tenth)]
-        pairs.append((small_jump(tenth, "up"), grazing_of(tenth)[0]))
-        at_grazing.append(sum(judge_step(truth, found) is Verdict.AGREES for found, truth in pairs))
-    ninth, tenth = (data[name]["runs"] for name in ("fig09_rig", "fig10_rig"))
-    count = _jumps(ninth, tenth)
+        steps = (judge_step(grazing_of(both[i])[at], find(both[i], way)) for i, find, way, at in _AT_GRAZING)
+        at_grazing.append(sum(step is Verdict.AGREES for step in steps))
+    runs = [data[name]["runs"] for name in ("fig09_rig", "fig10_rig")]
+    count = _jumps(runs)
     flips = int(np.isfinite(slowest(data["fig11_rig"])["measured_flip"].values).sum())
     chaos = int(data["fig16"]["attractor"]["measured_period_number"]) == APERIODIC
-    cells = [
-        grazing_cell(main_jump(ninth, "down"), FIGURE_9, -1),
-        grazing_cell(main_jump(tenth, "down"), FIGURE_10, -1),
-        grazing_cell(small_jump(tenth, "up"), FIGURE_10, 0),
-    ]
+    cells = (grazing_cell(find(runs[i], way), (FIGURE_9, FIGURE_10)[i], at) for i, find, way, at in _AT_GRAZING)
     near = sum(cell.verdict is Verdict.AGREES for cell in cells)
     yield of_both(
-        "C1",
         "Section 5",
         "dynamical jumps, bifurcations and chaos",
         texts,
@@ -184,7 +168,6 @@ def c1(data: Data) -> Iterator[Statement]:
         )
     )
     yield of_both(
-        "C1",
         "Section 5",
         "grazing causes abrupt changes (falling jumps of Figs. 9 and 10, small rising one)",
         (f"{n} of 3 within one step of the closed-form grazing" for n in at_grazing),
@@ -204,7 +187,6 @@ def c1_other_systems(data: Data) -> Iterator[Statement]:
     """The smoothing in the form that fits other systems."""
     order = order_in_eta(data["eta"]["error"], "general")
     yield Statement(
-        "C1",
         "Section 5",
         "the procedure may be useful for other non-smooth systems",
         "not a number",

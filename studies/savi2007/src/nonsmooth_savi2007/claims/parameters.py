@@ -34,14 +34,14 @@ _SAME = "as exact: no contact in this"
 _LEAST_LINE = 1e-2  # of the range: a straight line leaves less
 
 
-def _row(claim: str, place: str, says: str, cell: Cell, why: str = "", model: str = _NO_MODEL) -> Statement:
+def _row(place: str, says: str, cell: Cell, why: str = "", model: str = _NO_MODEL) -> Statement:
     """A row to which the model has nothing to say."""
-    return Statement(claim, place, says, model, model, "see rig", Verdict.NOT_ASKED, why).measured(cell)
+    return Statement(place, says, model, model, "see rig", Verdict.NOT_ASKED, why).measured(cell)
 
 
-def _closed(claim: str, says: str, printed: Printed, model: float, cell: Cell, why: str = "") -> Statement:
+def _closed(says: str, printed: Printed, model: float, cell: Cell, why: str = "") -> Statement:
     """A printed number beside a closed form of the model with Table 1, and beside the rig."""
-    row = against_printed(claim, says, printed, [Interval(model, model), None], why)
+    row = against_printed(says, printed, [Interval(model, model), None], why)
     text = f"{model:.4g} {printed.unit}".rstrip()
     difference = f"closed form {row.exact_beside}"
     return replace(row, exact=f"{text} (closed form)", smoothed=_SAME, difference=difference).measured(cell)
@@ -63,7 +63,6 @@ def r1(data: Data) -> Iterator[Statement]:
     step, turning, volts = (float(seen[name]) for name in ("angle_step", "turning", "volts_high"))
     good = abs(step - 0.25) < 1e-6 and turning < 30 and volts <= 12
     yield _row(
-        "R1",
         "Fig. 3",
         "car, two springs and strings, motor 0-12 V with crank, magnetic damper, support, rotary "
         "sensor: 0.25 degrees, up to 30 rev/s",
@@ -82,7 +81,6 @@ def r2(data: Data) -> Iterator[Statement]:
     rate, step, used = (float(seen[name]) for name in ("rate", "force_step", "force_used"))
     good = abs(rate - 100) < 0.1 and abs(step - 0.03) < 1e-6 and used <= 50
     yield _row(
-        "R2",
         "Section 3.1",
         "100 Hz; force sensor to 50 N, 1 %, resolution 0.03 N",
         Cell(f"{rate:.2f} Hz; steps of {step:g} N, {used:.1f} N used", _built(good)),
@@ -94,22 +92,10 @@ def p1(data: Data) -> Iterator[Statement]:
     """Two stiffnesses from slopes."""
     car, support = (found_in(data["fig04"][key]) for key in ("oscillator", "support"))
     why = "The slope on the car is 2k: both springs pull. Nearly all of the uncertainty is the force sensor's gain."
-    yield _row(
-        "P1",
-        TABLE_1["k"].place,
-        f"slope of force over displacement: k = {TABLE_1['k']}",
-        _back(TABLE_1["k"], car.estimate.times(0.5)),
-        why,
-        _GIVEN,
-    )
-    yield _row(
-        "P1",
-        TABLE_1["k_s"].place,
-        f"slope of force over displacement: k_s = {TABLE_1['k_s']}",
-        _back(TABLE_1["k_s"], support.estimate),
-        "",
-        _GIVEN,
-    )
+    for name, found, words in (("k", car.estimate.times(0.5), why), ("k_s", support.estimate, "")):
+        printed = TABLE_1[name]
+        says = f"slope of force over displacement: {name} = {printed}"
+        yield _row(printed.place, says, _back(printed, found), words, _GIVEN)
 
 
 def p2(data: Data) -> Iterator[Statement]:
@@ -117,12 +103,10 @@ def p2(data: Data) -> Iterator[Statement]:
     mass = table_rows(data["table1"])["m"][1]
     slope = found_in(data["fig04"]["oscillator"]).estimate
     value = math.sqrt(slope.value / mass.value)
-    u = 0.5 * value * math.hypot(slope.uncertainty / slope.value, mass.uncertainty / mass.value)
-    natural = Estimate(value, u)
+    natural = Estimate(value, 0.5 * value * math.hypot(slope.relative, mass.relative))
     printed = NUMBERS["natural frequency"]
-    yield _row("P2", TABLE_1["m"].place, f"m = {TABLE_1['m']} by weighing", _back(TABLE_1["m"], mass), "", _GIVEN)
+    yield _row(TABLE_1["m"].place, f"m = {TABLE_1['m']} by weighing", _back(TABLE_1["m"], mass), "", _GIVEN)
     yield _closed(
-        "P2",
         f"natural frequency from stiffness and mass: {printed}",
         printed,
         NATURAL_FREQUENCY,
@@ -139,7 +123,6 @@ def p3(data: Data) -> Iterator[Statement]:
     nearest = round(NATURAL_FREQUENCY / (2 * math.pi) / step) * step
     top = grid.value / (2 * math.pi)
     yield _closed(
-        "P3",
         f"impulsive response: peak of the DFT at {line}",
         line,
         nearest,
@@ -150,7 +133,6 @@ def p3(data: Data) -> Iterator[Statement]:
         "begins.",
     )
     yield _closed(
-        "P3",
         f"natural frequency from it: {TABLE_1['omega_0']}",
         TABLE_1["omega_0"],
         NATURAL_FREQUENCY,
@@ -166,7 +148,6 @@ def p4(data: Data) -> Iterator[Statement]:
     printed, ratio = TABLE_1["c"], NUMBERS["damping ratio"]
     per = 1 / (2 * TABLE_1["m"].value * NATURAL_FREQUENCY)
     yield _closed(
-        "P4",
         f"c = {printed} by fitting the amplitude over frequency (viscous damping alone)",
         printed,
         2 * ratio.value * TABLE_1["m"].value * NATURAL_FREQUENCY,
@@ -177,7 +158,6 @@ def p4(data: Data) -> Iterator[Statement]:
         + ".",
     )
     yield _closed(
-        "P4",
         f"xi = {ratio}",
         ratio,
         printed.value * per,
@@ -185,7 +165,6 @@ def p4(data: Data) -> Iterator[Statement]:
         "c / (2 m omega_0).",
     )
     yield _row(
-        "P4",
         "Section 3.1",
         "in the considered range the dry friction may be neglected",
         Cell(
@@ -208,7 +187,6 @@ def p5(data: Data) -> Iterator[Statement]:
     printed, ratio = TABLE_1["c_s"], NUMBERS["damping ratio of the support"]
     per = 1 / (2 * math.sqrt(TABLE_1["k_s"].value * TEST_MASS))
     yield _closed(
-        "P5",
         f"support with 1.33 kg, free decay: xi_s = {ratio}",
         ratio,
         printed.value * per,
@@ -216,7 +194,6 @@ def p5(data: Data) -> Iterator[Statement]:
         "Closed form: c_s / (2 sqrt(k_s M)).",
     )
     yield _closed(
-        "P5",
         f"logarithmic decrement: c_s = {printed}",
         printed,
         ratio.value / per,
@@ -225,37 +202,28 @@ def p5(data: Data) -> Iterator[Statement]:
     )
 
 
-def _line(data: Data, key: str) -> tuple[float, Cell]:
-    """Largest residual of a calibration relative to its range, and the rig's words."""
+def _line(data: Data, key: str) -> Cell:
+    """A calibration's slope, and its largest residual relative to its range."""
     picture, found = data["fig08"][key], found_in(data["fig08"][key])
     fitted = float(picture["slope"]) * picture["setting"].values + float(picture["intercept"])
     left = float(np.abs(picture["reading"].values - fitted).max() / np.ptp(fitted))
     text = f"a line of slope {found.estimate}; its {len(found.runs)} points lie within {100 * left:.2g} % of the range"
-    return left, Cell(text, _built(left < _LEAST_LINE))
+    return Cell(text, _built(left < _LEAST_LINE))
 
 
 def p6(data: Data) -> Iterator[Statement]:
     """Frequency over voltage."""
     offset = found_in(data["fig08"]["voltage"]).others["offset"]
-    yield _row(
-        "P6",
-        "Fig. 8a",
-        "frequency over motor voltage: a line is fitted (no number printed)",
-        _line(data, "voltage")[1],
-        f"The motor turns from {offset} on: the line does not pass through zero.",
-    )
+    why = f"The motor turns from {offset} on: the line does not pass through zero."
+    says = "frequency over motor voltage: a line is fitted (no number printed)"
+    yield _row("Fig. 8a", says, _line(data, "voltage"), why)
 
 
 def p7(data: Data) -> Iterator[Statement]:
     """Forcing over crank length."""
-    yield _row(
-        "P7",
-        "Fig. 8b",
-        "forcing amplitude over crank length: a line is fitted (no number printed)",
-        _line(data, "crank")[1],
-        "Its slope is k, to first order in the crank: only one of the springs is driven.",
-        "rho = k a",
-    )
+    why = "Its slope is k, to first order in the crank: only one of the springs is driven."
+    says = "forcing amplitude over crank length: a line is fitted (no number printed)"
+    yield _row("Fig. 8b", says, _line(data, "crank"), why, "rho = k a")
 
 
 def p8(data: Data) -> Iterator[Statement]:
@@ -271,6 +239,6 @@ def p8(data: Data) -> Iterator[Statement]:
         cell = _back(printed, number)
         if name == "omega_0":
             why += f" Printed to {printed.rounding:g}, but read off a DFT: known to {printed.resolution:.2f} rad/s."
-            yield _closed("P8", says, printed, NATURAL_FREQUENCY, cell, why)
+            yield _closed(says, printed, NATURAL_FREQUENCY, cell, why)
         else:
-            yield _row("P8", "Table 1", says, cell, why, _GIVEN)
+            yield _row("Table 1", says, cell, why, _GIVEN)

@@ -18,11 +18,10 @@ from nonsmooth_savi2007.claims.verdicts import (
     of_both,
 )
 from nonsmooth_savi2007.figures.motions import measured_periods_at
-from nonsmooth_savi2007.figures.portraits import chosen_start, words_of
+from nonsmooth_savi2007.figures.portraits import chosen_points, words_of
 from nonsmooth_savi2007.measure import (
     APERIODIC,
     motion_word,
-    parameter_of,
     period_words,
     periods_reached,
     separation_rate,
@@ -60,7 +59,6 @@ def _portraits(
     found = {value: measured_periods_at(data[f"{figure}_rig"], value) for value in shown}
     right = [period in found[value] for value, period in shown.items()]
     return of_both(
-        figure[:1].upper() + figure[3:],
         place,
         says + _named(shown),
         (_reached(data[figure][flow], shown) for flow in FLOWS),
@@ -91,11 +89,9 @@ def _apart(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
             continue
         points = []
         for flow in FLOWS:
-            survey = data[flow]
-            one = survey.sel({parameter_of(survey): value}, method="nearest").isel(
-                start=chosen_start(survey, value, wanted)
+            points.append(
+                chosen_points(data[flow], value, wanted)["section"].transpose("iterate", "state").values[-wanted:]
             )
-            points.append(one["section"].transpose("iterate", "state").values[-wanted:])
         worst = max(worst, np.abs(points[0][:, None, :] - points[1][None, :, :])[..., 0].min(axis=1).max())
     return f"section points of both flows within {1e6 * worst:.2g} micrometres"
 
@@ -107,7 +103,6 @@ def f14(data: Data) -> Iterator[Statement]:
         reached = periods_reached(both[0], g)
         as_printed = as_printed and period in reached
         yield of_both(
-            "F14",
             "Fig. 14, caption",
             f"g = {g:g} m: {motion_word(period)}",
             (words_of(periods_reached(one, g)) for one in both),
@@ -117,7 +112,6 @@ def f14(data: Data) -> Iterator[Statement]:
         ).measured(at_gap(data["fig14_rig"], g, period))
     right = sum(period in periods_reached(both[0], g) for g, period in FIGURE_14_TEXT.items())
     yield of_both(
-        "F14",
         "Section 4, on Fig. 14",
         f"the text's gaps: {_named(FIGURE_14_TEXT)}",
         (_reached(one, FIGURE_14_TEXT) for one in both),

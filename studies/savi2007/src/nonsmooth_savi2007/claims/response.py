@@ -58,7 +58,6 @@ def f9a(data: Data) -> Iterator[Statement]:
             f"{100 * (printed.value - found[0]) / (found[1] - found[0]):.0f} % of it."
         )
     yield of_both(
-        "F9a",
         _9,
         f"rising frequency: a small period-2 region near {printed}",
         _ranges(both, "up"),
@@ -67,7 +66,6 @@ def f9a(data: Data) -> Iterator[Statement]:
         why,
     ).measured(doubled_cell(runs, "up", printed.value))
     yield against_printed(
-        "F9a",
         f"rising frequency: dynamical jump near {rising}",
         rising,
         [main_jump(one, "up") for one in both],
@@ -76,22 +74,17 @@ def f9a(data: Data) -> Iterator[Statement]:
     ).measured(printed_cell(rising, main_jump(runs, "up")))
 
 
-def _with_printed_frequency() -> list[list[float]]:
-    """Grazing frequencies of Fig. 9 (rad/s) were omega_0 of Table 1 right, and its k, or its m, wrong."""
-    ratio = (TABLE_1["omega_0"].value / NATURAL_FREQUENCY) ** 2
-    changes = {"k": TABLE_1["k"].value * ratio}, {"m": TABLE_1["m"].value / ratio}
-    return [grazing_of_paper({**FIGURE_9, **changed}) for changed in changes]
-
-
 def f9b(data: Data) -> Iterator[Statement]:
     """Falling frequency: the jump at grazing, and period 2 again."""
     both, runs = _responses(data, "fig09")
     closed, jumps = grazing_of(both[0])[-1], [main_jump(one, "down") for one in both]
     falling, on_rig = NUMBERS["jump falling"], main_jump(runs, "down")
-    (below, stiffer), (under, lighter) = _with_printed_frequency()
+    # were omega_0 of Table 1 right, and its k, or its m, wrong
+    ratio = (TABLE_1["omega_0"].value / NATURAL_FREQUENCY) ** 2
+    below, stiffer = grazing_of_paper({**FIGURE_9, "k": TABLE_1["k"].value * ratio})
+    under, lighter = grazing_of_paper({**FIGURE_9, "m": TABLE_1["m"].value / ratio})
     met = [judge(falling.value, Interval(one, one), falling.resolution) for one in (stiffer, lighter)]
     yield against_printed(
-        "F9b",
         f"falling frequency: dynamical jump at {falling}",
         falling,
         jumps,
@@ -105,7 +98,6 @@ def f9b(data: Data) -> Iterator[Statement]:
         cause=Cause.TABLE_1 if Verdict.AGREES in met else None,
     ).measured(printed_cell(falling, on_rig))
     yield against_grazing(
-        "F9b",
         "falling jump at grazing",
         both,
         -1,
@@ -113,7 +105,6 @@ def f9b(data: Data) -> Iterator[Statement]:
         "Within one step of the sweep; read from its amplitudes alone.",
     ).measured(grazing_cell(on_rig, FIGURE_9, -1))
     yield of_both(
-        "F9b",
         _9,
         "falling frequency: period 2 appears again",
         _ranges(both, "down"),
@@ -133,7 +124,7 @@ def f9c(data: Data) -> Iterator[Statement]:
             continue
         x = response["amplitude"].sel(state="x", omega=slice(down.high, up.low))
         apart = np.abs(x.sel(direction="up") - x.sel(direction="down")) / x.max("direction")
-        wide.append(float(apart.min()))
+        wide.append(apart.min().item())
         texts.append(
             f"{down.value:.3f} ... {up.value:.3f} rad/s: two stable motions, amplitudes apart by "
             f"{100 * wide[-1]:.0f} % at least"
@@ -142,10 +133,11 @@ def f9c(data: Data) -> Iterator[Statement]:
     branch = data["fig09"]["branch"]
     table = special_points(branch)
     folds = table["point"].values[table["kind"].values == "fold"]
-    between = branch.isel(point=slice(int(folds.min()) + 1, int(folds.max())))
-    unstable = not bool(between["stable"].any())
-    ends = sorted(branch["omega"].values[[folds.min(), folds.max()]])
-    largest = float(np.abs(between["floquet_multipliers"]).max())
+    first, last = folds.min(), folds.max()
+    between = branch.isel(point=slice(first + 1, last))
+    unstable = not between["stable"].values.any()
+    ends = sorted(branch["omega"].values[[first, last]])
+    largest = np.abs(between["floquet_multipliers"].values).max()
     heights = 1e3 * 0.5 * (between["maximum"] - between["minimum"]).sel(state="x").values
     texts[0] += (
         f"; the branch between them, from fold to fold, {ends[0]:.8f} ... {ends[1]:.8f} rad/s: "
@@ -153,7 +145,6 @@ def f9c(data: Data) -> Iterator[Statement]:
     )
     below = grazing_of(both[0])[-1] - ends[0]
     yield of_both(
-        "F9c",
         _9,
         "an unstable region between the jumps with rising and falling frequency",
         texts,
@@ -173,18 +164,14 @@ def f10(data: Data) -> Iterator[Statement]:
     rig_up, rig_down, rig_small = main_jump(runs, "up"), main_jump(runs, "down"), small_jump(runs, "up")
     doubled = [int((one["period_number"] == 2).sum()) for one in both]
     yield of_both(
-        "F10",
         _10,
         "jumps as in Fig. 9, elsewhere with rising than with falling frequency",
         map(_main, both),
         "no number printed",
         agreed(None not in (main_jump(both[0], "up"), falling[0])),
     ).measured(Cell(_main(runs), Verdict.UNDECIDED if None in (rig_up, rig_down) else Verdict.AGREES))
-    yield against_grazing("F10", "falling jump at grazing", both, -1, falling).measured(
-        grazing_cell(rig_down, FIGURE_10, -1)
-    )
+    yield against_grazing("falling jump at grazing", both, -1, falling).measured(grazing_cell(rig_down, FIGURE_10, -1))
     yield of_both(
-        "F10",
         _10,
         "no period-2 response",
         (f"{n} of {one['period_number'].size} points with period 2" for n, one in zip(doubled, both, strict=True)),
@@ -192,7 +179,6 @@ def f10(data: Data) -> Iterator[Statement]:
         agreed(not any(doubled)),
     ).measured(no_doubled_cell(runs))
     yield of_both(
-        "F10",
         _10,
         "a small jump instead",
         map(_small, both),
@@ -201,7 +187,7 @@ def f10(data: Data) -> Iterator[Statement]:
         "With rising frequency at the grazing of the motion without contact, with falling at a fold of the "
         "motion with contact.",
     ).measured(Cell(_small(runs), Verdict.UNDECIDED if rig_small is None else Verdict.AGREES))
-    yield against_grazing("F10", "small jump, rising, at grazing", both, 0, small).measured(
+    yield against_grazing("small jump, rising, at grazing", both, 0, small).measured(
         grazing_cell(rig_small, FIGURE_10, 0)
     )
 
@@ -211,9 +197,8 @@ def grazing_behind_both(data: Data) -> Iterator[Statement]:
     both, runs = _responses(data, "fig09")
     omega, number = measured_periods(runs, "up")
     at = np.flatnonzero(number == 2)
-    first = Interval(float(omega[at[0] - 1]), float(omega[at[0]])) if len(at) and at[0] else None
+    first = Interval(omega[at[0] - 1], omega[at[0]]) if len(at) and at[0] else None
     yield against_grazing(
-        "F10",
         "both (period 2 in Fig. 9, the small jump in Fig. 10) are probably related to grazing; closed "
         "form of Fig. 9's lower grazing",
         both,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import NamedTuple, TypeAlias
 
@@ -106,9 +106,9 @@ class Beside:
     expanded: float
 
     @classmethod
-    def of(cls, printed: float, resolution: float, found: Uncertain | None) -> Beside | None:
+    def of(cls, printed: Printed, found: Uncertain | None) -> Beside | None:
         """None where nothing was found."""
-        return None if found is None else cls(printed, resolution, found.value, found.expanded)
+        return None if found is None else cls(printed.value, printed.resolution, found.value, found.expanded)
 
     @property
     def percent(self) -> float:
@@ -147,11 +147,12 @@ class Cell(NamedTuple):
 class Statement:
     """One statement: what the paper says (``place``: where), what both flows and the rig give, and what follows.
 
+    ``id`` is that of its claim, which `measure_claims` writes in.
     ``verdict`` is on the exact flow, ``rig_verdict`` on the virtual rig; ``cause``: why one of them differs, where it
     is not real. The numbers beside a printed one are in ``exact_beside``, ``smoothed_beside`` and ``rig_beside``.
     """
 
-    id: str
+    id: str = field(default="", kw_only=True)
     place: str
     says: str
     exact: str
@@ -187,7 +188,6 @@ class Statement:
 
 
 def of_both(
-    claim: str,
     place: str,
     says: str,
     found: Iterable[str],
@@ -198,7 +198,7 @@ def of_both(
 ) -> Statement:
     """A statement with what the exact flow and the smoothed one give."""
     exact, smoothed = found
-    return Statement(claim, place, says, exact, smoothed, difference, verdict, why, cause=cause)
+    return Statement(place, says, exact, smoothed, difference, verdict, why, cause=cause)
 
 
 def printed_cell(
@@ -208,14 +208,13 @@ def printed_cell(
     verdict = judge(printed.value, found, printed.resolution)
     if put_in and verdict is Verdict.AGREES:
         verdict = Verdict.INPUT
-    beside = Beside.of(printed.value, printed.resolution, found)
+    beside = Beside.of(printed, found)
     if found is None:
         return Cell(f"not found{note}", Verdict.UNDECIDED, why)  # records may be too few or too coarse to show it
     return Cell(f"{_with_unit(found, printed.unit)}{note}; {beside}", verdict, why, beside)
 
 
 def against_printed(
-    claim: str,
     says: str,
     printed: Printed,
     found: Sequence[Uncertain | None],
@@ -223,10 +222,9 @@ def against_printed(
     cause: Cause | None = None,
 ) -> Statement:
     """A printed number beside what both flows give; the verdict is on the exact one."""
-    beside = [Beside.of(printed.value, printed.resolution, one) for one in found]
+    beside = [Beside.of(printed, one) for one in found]
     words = [str(one) if one is not None else "not found" for one in beside]
     row = of_both(
-        claim,
         printed.place,
         says,
         (_with_unit(one, printed.unit) for one in found),
@@ -239,7 +237,6 @@ def against_printed(
 
 
 def against_grazing(
-    claim: str,
     says: str,
     swept: Sequence[xr.Dataset],
     which: int,
@@ -256,7 +253,6 @@ def against_grazing(
     off = ["not found" if found is None else f"{found.value - truth:+.4f} rad/s" for found, truth in pairs]
     verdicts = [judge_step(truth, found) for found, truth in pairs]
     return of_both(
-        claim,
         place,
         f"{says}: {closed[0]:.5f} rad/s (gap g - eta: {closed[1]:.5f})",
         (_with_unit(found, "rad/s") for found in met),

@@ -17,7 +17,7 @@ from the same function.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,8 +55,8 @@ class GapReference(NamedTuple):
     ----------
     offset : GapOffset
         What the gap at rest is more than the screw reads.
-    places : MeanShift, optional
-        Place of rest, and about which the car swings, in the sensor's count. None: x and g stay as read.
+    places : MeanShift
+        Place of rest, and about which the car swings, in the sensor's count; no shift: x and g stay as read.
     direction : int
         -1 where the sensor counts away from the support.
     mark : float
@@ -64,30 +64,28 @@ class GapReference(NamedTuple):
     """
 
     offset: GapOffset
-    places: MeanShift | None = None
+    places: MeanShift = MeanShift(0.0, 0.0, 0.0, np.zeros((3, 3)), np.zeros(3), 0)
     direction: int = 1
     mark: float = 0.0
 
     @property
     def runs(self) -> int:
         """Runs without the support behind it."""
-        return 0 if self.places is None else self.places.runs
+        return self.places.runs
 
     def mean(self, crank_length: float) -> tuple[float, float]:
         """The car's mean position (m) in the sensor's count, and its standard uncertainty."""
-        return (0.0, 0.0) if self.places is None else self.places.place(crank_length)
+        return self.places.place(crank_length)
 
     def gap(self, reading: float, crank_length: float) -> tuple[float, float]:
         """The gap (m) from the mean position at a reading of the screw, and its standard uncertainty."""
-        if self.places is None:
-            return reading + self.offset.value, self.offset.uncertainty
         shift, error = self.places.at(crank_length)
         variance = self.offset.uncertainty**2 + error**2
         if self.offset.rest is not None and abs(self.offset.rest - self.places.rest) < 1e-12:
             # the taps that the gap at rest was counted from: rest falls out of the difference
             own = self.offset.uncertainty**2 - float(self.places.covariance[0, 0])
             variance = max(own, 0.0) + self.places.place(crank_length)[1] ** 2
-        return reading + self.offset.value - shift, float(np.sqrt(variance))
+        return reading + self.offset.value - shift, np.sqrt(variance)
 
 
 def gap_reference(
@@ -117,16 +115,16 @@ def gap_reference(
     ValueError
         A run without the channels that it needs; the message names run and channel.
     """
-
-    given = _offset(offset)
+    if not isinstance(offset, GapOffset):
+        offset = GapOffset(*(float(one) for one in (*np.atleast_1d(offset), 0.0)[:2]))
     evidence = gather(session, procedures=_TELLING)
     notes = list(evidence.notes)
     if not referred:
-        return GapReference(given, direction=evidence.direction)
+        return GapReference(offset, direction=evidence.direction)
     taps, mark = evidence.runs["impulse"], 0.0
-    decay = free_decay(taps, resolution=evidence.resolution) if taps else None
-    seen = steady([run for run in evidence.runs["response"] if "gap" not in run.settings])
-    found = places(evidence, decay, seen, held=given.held)
+    decay = free_decay(taps) if taps else None
+    seen = steady([run for run in evidence.runs["response"] if not run.mounted])
+    found = places(evidence, decay, seen, held=offset.held)
     if decay is not None:
         mark, said = mark_of(seen, decay)
         notes += [*(f"impulse: {note}" for note in decay.notes), *([said] if said else [])]
@@ -138,13 +136,7 @@ def gap_reference(
         )
     for note in (*notes, *found.notes):
         warnings.warn(note, RecordingWarning, stacklevel=3)
-    return GapReference(given, found, evidence.direction, mark)
-
-
-def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:
-    if isinstance(given, GapOffset):
-        return given
-    return GapOffset(*(float(one) for one in (*np.atleast_1d(given), 0.0)[:2]))
+    return GapReference(offset, found, evidence.direction, mark)
 
 
 def gap_offset(parameters: Any, session: Session) -> GapOffset:
@@ -171,10 +163,8 @@ def gap_offset(parameters: Any, session: Session) -> GapOffset:
     rest = parameters.extra.get("rest_position")
     held = None
     if "friction" in parameters.extra and "k" in parameters:
-        held = max(float(parameters.extra["friction"].value), 0.0) / (2 * float(parameters["k"]))
-    return GapOffset(
-        float(at_rest.value) - reading, float(at_rest.uncertainty), None if rest is None else float(rest.value), held
-    )
+        held = max(parameters.extra["friction"].value, 0.0) / (2 * parameters["k"])
+    return GapOffset(at_rest.value - reading, at_rest.uncertainty, None if rest is None else rest.value, held)
 
 
 #: What a run with each procedure shows.
@@ -254,7 +244,9 @@ def session_measurement(
         )
         for item in chosen
     ]
-    settings: dict[str, Any] = {"rho": _force(length, crank_force)}
+    settings: dict[str, Any] = {
+        "rho": (lambda p: p["k"] * length) if crank_force is None else crank_force * length,
+    }
     first = chosen[0].settings
     if "gap" in first:
         settings["g"] = reference.gap(float(first["gap"]), length)
@@ -273,7 +265,7 @@ def session_measurement(
                 f"{len(chosen)} runs of {procedure!r}, {', '.join(i.run for i in chosen)}: a diagram over g needs runs "
                 "at one frequency, each with a gap of its own; a motion is one run: run = ..."
             )
-        settings["omega"] = (float(np.mean(omega)), float(motions[0]["omega_error"]))
+        settings["omega"] = (np.mean(omega), float(motions[0]["omega_error"]))
         return measured_sections(motions, "g", gaps, unit="m"), {n: settings[n] for n in ("rho", "omega")}
     (motion,) = motions
     if shows == "motion":
@@ -319,9 +311,3 @@ def _crank_length(chosen: list[Any]) -> float:
             "response, or a diagram, has one; name the runs"
         )
     return lengths.pop() if lengths else 0.0
-
-
-def _force(length: float, crank_force: float | None) -> float | Callable[[Mapping[str, float]], float]:
-    if crank_force is not None:
-        return crank_force * length
-    return lambda p: p["k"] * length

@@ -1,4 +1,7 @@
-"""The effect of eta (claim M4): the error of the smoothed switch over the width of its band, and where it grazes."""
+"""The smoothed switch: its regions beside those of the sharp one (Fig. 2), and the effect of eta (claim M4).
+
+The error over the width of its band, and where it grazes.
+"""
 
 from __future__ import annotations
 
@@ -48,12 +51,10 @@ def _errors(settings: Settings) -> xr.Dataset:
         truth = simulate(sharp, periods=PERIODS, start=begin, samples=2, **EXACT.options)
         slowest[i] = np.abs(truth["u_before"].sel(state="v").values).min()
         for j, eta in enumerate(etas):
-            for k, (model, rtol) in enumerate(
-                ((sharp, FINE), (sharp, SMOOTHED.options["rtol"]), (general_form(sharp), FINE))
-            ):
-                run = simulate(
-                    model.smoothed(float(eta)), periods=PERIODS, start=begin, samples=2, method="rkf45", rtol=rtol
-                )
+            forms = ((sharp, FINE), (sharp, SMOOTHED.options["rtol"]), (general_form(sharp), FINE))
+            for k, (model, rtol) in enumerate(forms):
+                model = model.smoothed(float(eta))
+                run = simulate(model, periods=PERIODS, start=begin, samples=2, method="rkf45", rtol=rtol)
                 difference = (run["u"].values[-1] - truth["u"].values[-1]) / sharp.scale_vector()
                 error[k, i, j] = np.linalg.norm(difference)
     found = xr.Dataset(
@@ -70,16 +71,24 @@ def _grazing(settings: Settings) -> xr.Dataset:
     """Upper frequency of Fig. 9 at which the motion without contact first meets the band; at eta 0, the support."""
     etas = np.concatenate([[0.0], ETAS[2:3] if settings.quick else ETAS])
     found = np.array([_first_meeting(float(eta)) for eta in etas])
-    sharp = EXACT.system(**FIGURE_9)
-    closed = [grazing_frequencies({**sharp.values, "g": FIGURE_9["g"] - eta})[-1] for eta in etas]
     made = xr.Dataset(
         {
             "grazing": ("eta", found, {"long_name": "grazing frequency, bisected", "units": "rad/s"}),
-            "closed_form": ("eta", closed, {"long_name": "grazing frequency of the gap g - eta", "units": "rad/s"}),
+            "closed_form": (
+                "eta",
+                _closed(etas),
+                {"long_name": "grazing frequency of the gap g - eta", "units": "rad/s"},
+            ),
         },
         {"eta": ("eta", etas, {"units": "m"})},
     )
     return as_result(made, f"grazing, bisected to {NARROW:g} rad/s", "simulate", synthetic=False)
+
+
+def _closed(etas: np.ndarray) -> np.ndarray:
+    """The same in closed form: upper grazing frequencies of the gaps g - eta."""
+    sharp = EXACT.system(**FIGURE_9).values
+    return np.array([grazing_frequencies({**sharp, "g": FIGURE_9["g"] - eta})[-1] for eta in etas])
 
 
 def _first_meeting(eta: float) -> float:
@@ -107,34 +116,48 @@ def order_in_eta(errors: xr.Dataset, form: str) -> np.ndarray:
     )
 
 
+def _draw_regions(canvas: Canvas, data: Datasets) -> None:
+    left, right = canvas.subplots(1, 2)
+    for ax, flow in ((left, EXACT), (right, SMOOTHED)):
+        plot.regions(flow.system(g=0.0), ax, xlim=(-5 * ETA, 5 * ETA), ylim=(-0.12, 0.12))
+        ax.set_xlabel(ax.get_xlabel().replace("$x$", "$x - g$"))
+    left.set_title("(a) non-smooth system, Eqs. 4-5")
+    right.set_title(r"(b) smoothed system, $\eta = 10$ µm, Eqs. 9-10")
+
+
+_ABOUT_REGIONS = (
+    "Regions of the state plane with Table 1's support, near x = g: (a) without contact (white) and in contact "
+    "(blue), parted by the surfaces S_a (x = g) and S_b (the support's force vanishes); (b) the bands of half "
+    "width eta of the smoothed system in their place. Drawn from the system's own conditions."
+)
+
+
 def _draw(canvas: Canvas, data: Datasets) -> None:
     errors, grazing = data["error"], data["grazing"]
     left, right = canvas.subplots(1, 2)
     eta = 1e6 * errors["eta"].values  # in micrometres, as the axes
-    colors = [plot.COLORS[name] for name in ("first", "second", "third")]
-    for color, orbit in zip(colors, errors["orbit"].values, strict=True):
-        one = errors["error"].sel(orbit=orbit)
+    for name, orbit in zip(("first", "second", "third"), errors["orbit"].values, strict=True):
+        one, color = errors["error"].sel(orbit=orbit), plot.COLORS[name]
         left.loglog(eta, one.sel(form="paper"), "o-", color=color, label=str(orbit), markersize=3.5)
         left.loglog(eta, one.sel(form="paper, coarse"), "s", color=color, markerfacecolor="none", markersize=6)
         left.loglog(eta, one.sel(form="general"), ":", color=color)
     guide = 4 * float(errors["error"].sel(form="paper").max())
     left.loglog(eta, guide * (eta / eta.max()) ** 2, color=plot.COLORS["muted"], linewidth=0.8, label=r"$\eta^2$")
-    hollow = {"color": "black", "markerfacecolor": "none", "markersize": 6}
-    left.plot([], [], "s", label="rtol $10^{-6}$, as in the figures", **hollow)
+    left.plot(
+        [], [], "s", label="rtol $10^{-6}$, as in the figures", color="black", markerfacecolor="none", markersize=6
+    )
     left.plot([], [], ":", color="black", label="general form")
     left.set(
         title="(a) error of the smoothed switch after 4 periods",
         ylabel=r"$[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$",
     )
-    at = grazing["eta"].values > 0
-    base = float(grazing["closed_form"][0])
-    fine = np.geomspace(grazing["eta"].values[at].min() / 2, grazing["eta"].values[at].max() * 2, 50)
-    sharp = EXACT.system(**FIGURE_9).values
-    closed = [grazing_frequencies({**sharp, "g": FIGURE_9["g"] - e})[-1] - base for e in fine]
-    right.loglog(1e6 * fine, closed, color=plot.COLORS["third"], label=r"closed form, gap $g - \eta$")
+    base, met = float(grazing["closed_form"][0]), grazing.isel(eta=slice(1, None))  # without eta = 0
+    widths = met["eta"].values
+    fine = np.geomspace(widths.min() / 2, widths.max() * 2, 50)
+    right.loglog(1e6 * fine, _closed(fine) - base, color=plot.COLORS["third"], label=r"closed form, gap $g - \eta$")
     right.loglog(
-        1e6 * grazing["eta"].values[at],
-        grazing["grazing"].values[at] - base,
+        1e6 * widths,
+        met["grazing"].values - base,
         "o",
         color=plot.COLORS["first"],
         label="smoothed model, bisected",
@@ -164,4 +187,9 @@ def _caption(data: Datasets) -> str:
     )
 
 
-FIGURES = (Figure("eta", None, "The choice of eta", _compute, _draw, _caption, (1.0, 0.52)),)
+FIGURES = (
+    Figure(
+        "fig02", 2, "Regions and surfaces", lambda settings: {}, _draw_regions, lambda data: _ABOUT_REGIONS, (1.0, 0.42)
+    ),
+    Figure("eta", None, "The choice of eta", _compute, _draw, _caption, (1.0, 0.52)),
+)

@@ -77,14 +77,10 @@ def _flips(branch: xr.Dataset) -> list[xr.Dataset]:
     return [table.isel(special=i) for i in np.flatnonzero(table["kind"].values == "flip")]
 
 
-def at_ends(branch: xr.Dataset) -> np.ndarray:
-    """Return whether each special point of a branch is an end of it, and so belongs to the branch that it leaves."""
-    return np.isin(branch["special_point"].values, [0, branch.sizes["point"] - 1])
-
-
 def rows_of(branch: xr.Dataset) -> xr.Dataset:
-    """The special points of a branch itself, as a table."""
-    return special_points(branch).isel(special=np.flatnonzero(~at_ends(branch)))
+    """The special points of a branch itself, as a table: those at its ends belong to the branch that it leaves."""
+    at_ends = np.isin(branch["special_point"].values, [0, branch.sizes["point"] - 1])
+    return special_points(branch).isel(special=np.flatnonzero(~at_ends))
 
 
 def branches_of(data: Datasets) -> list[xr.Dataset]:

@@ -69,11 +69,8 @@ def curves(plane: Plane) -> list[xr.Dataset]:
     begin = BEGINNINGS[plane.figure]
     lines = list(branches(plane.figure).values())
     for period, value in plane.further.items():
-        orbit = find_orbit(
-            EXACT.system(**{**begin.parameters, begin.parameter: value}),
-            period_number=period,
-            progress=False,
-        )
+        system = EXACT.system(**{**begin.parameters, begin.parameter: value})
+        orbit = find_orbit(system, period_number=period, progress=False)
         lines.append(continue_orbit(orbit, begin.parameter, begin.range))
     for branch in lines:
         table = rows_of(branch)
@@ -107,6 +104,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     found = data["chart"]
     left, right = canvas.subplots(1, 2, sharey=True)
     simple = "omega" in found.dims  # few periods; what tells regions apart there is whether there is contact
+    xlim, ylim = (found[str(name)].values[[0, -1]] for name in found["status"].dims)
     plot.chart(found, left, show="contacts_per_period" if simple else "period_number")
     plot.chart(found, right)
     for key, one in data.items():
@@ -118,12 +116,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     titles = ("(a) contacts per period" if simple else "(a) period", "(b) period, with folds, flips and grazing")
     for ax, words in zip((left, right), titles, strict=True):
         ax.set_title(words, y=1.0, pad=9)
-        ax.set(xlim=_ends(found, 0), ylim=_ends(found, 1))
-
-
-def _ends(found: xr.Dataset, axis: int) -> tuple[float, float]:
-    values = found[str(found["status"].dims[axis])].values
-    return float(values[0]), float(values[-1])
+        ax.set(xlim=xlim, ylim=ylim)
 
 
 def _caption(data: Datasets) -> str:
@@ -133,13 +126,10 @@ def _caption(data: Datasets) -> str:
     ended = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
     kinds = [str(one["kind"].values) for key, one in data.items() if key.startswith("curve")]
     counted = ", ".join(f"{kinds.count(kind)} of {kind.replace('_', '-')}" for kind in _FOLLOWED if kind in kinds)
-    fixed = "g" if "g" not in (first, second) else "omega"
-    rays = (
-        " The system is piecewise linear, so all depends on g / rho alone: every boundary is a straight line."
-        if fixed == "omega"
-        else ""
-    )
-    shown = "Contacts per forcing period and period number" if fixed == "g" else "Period number"
+    fixed, shown, rays = "g", "Contacts per forcing period and period number", ""
+    if "g" in found.dims:
+        fixed, shown = "omega", "Period number"
+        rays = " The system is piecewise linear, so all depends on g / rho alone: every boundary is a straight line."
     return (
         f"{shown} over {first} and {second} at {fixed} = {float(found[fixed]):g} {found[fixed].attrs['units']}, "
         f"{found.sizes[first]} x {found.sizes[second]} points from rest (exact flow). Statuses: {ended}. Curves: "

@@ -51,11 +51,8 @@ def kinds_of(found: xr.Dataset) -> list[str]:
 
 def names_of(found: xr.Dataset) -> list[str]:
     """``period 3, 67.30 ± 0.29 %`` of each attractor: what it is, its share with the binomial error."""
-    words = []
-    for k, kind in enumerate(kinds_of(found)):
-        share, error = (100 * float(found[name][k]) for name in ("fraction", "fraction_error"))
-        words.append(f"{kind}, {share:.2f} ± {error:.2f} %")
-    return words
+    rows = zip(kinds_of(found), found["fraction"].values, found["fraction_error"].values, strict=True)
+    return [f"{kind}, {100 * share:.2f} ± {100 * error:.2f} %" for kind, share, error in rows]
 
 
 def _draw(canvas: Canvas, data: Datasets) -> None:

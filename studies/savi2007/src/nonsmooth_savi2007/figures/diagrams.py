@@ -1,8 +1,12 @@
-"""Bifurcation diagrams beside each other: the exact flow and the smoothed switch, several starts behind the sweeps."""
+"""Figures 11, 13 and 17: bifurcation diagrams by both flows, several starts behind the sweeps.
+
+Over the forcing amplitude, the gap, and the frequency across a range of chaos that ends in grazing.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,19 +14,25 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from nonsmooth import plot, sweep
-from nonsmooth.plot import annotate, shared_legend
+from nonsmooth.plot import annotate, prefixed, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
-from nonsmooth_savi2007.figures.figure import Canvas, Datasets, only_outer
+from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
+from nonsmooth_savi2007.figures.resonance import grazing_of, mark_grazing
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
 from nonsmooth_savi2007.measure import parameter_of
+from nonsmooth_savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_17, FIGURE_18, NUMBERS
 
 _OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
+_JUST_ABOVE = 9.8  # rad/s, above the grazing frequency of Fig. 17
+PATIENCE = 4000  # periods: above grazing the model's chaos is a transient, which is no motion to compare with
 
-#: What a caption says of them.
-ABOUT_BRANCHES = (
-    "Branches in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1; where they are "
-    "stable, the swept points lie on them. Special points are marked on those of period 1 and 2. "
-)
+_PRINTED = [NUMBERS[f"period {n} from"] for n in (4, 2, 1)]
+#: Values that a diagram marks, each with its number, and what they are.
+MARKED = {
+    "fig11": ({one.value: one.text for one in _PRINTED}, "printed in the paper (N)"),
+    "fig13": ({g: prefixed(g, "m")[0] for g in FIGURE_14}, "gaps of Fig. 14 (mm)"),
+    "fig17": ({omega: f"{omega:.2f}" for omega in FIGURE_18}, "frequencies of Fig. 18 (rad/s)"),
+}
 
 
 def diagrams(
@@ -62,11 +72,11 @@ def diagrams(
     return data | branches(figure)
 
 
-def draw_diagram(ax: Axes, data: Datasets, key: str, y: str, *, values: Mapping[float, str], words: str) -> None:
-    """One diagram: up, down over it, and in grey what other starts lead to; ``values`` of the paper as dotted lines.
+def draw_diagram(ax: Axes, data: Datasets, key: str, y: str, figure: str) -> None:
+    """One diagram: up, down over it, in grey what other starts lead to, and what is ``MARKED``.
 
     On that of the exact flow the branches of periodic orbits. Other starts that reached no period are told apart: chaos
-    looks like a transient that is not over. ``words`` say in the legend which values these are.
+    looks like a transient that is not over.
     """
     many, swept = data[f"{key}_starts"], data[key]
     other, settled = other_motions(many, swept), many["period_number"] > 0
@@ -77,16 +87,17 @@ def draw_diagram(ax: Axes, data: Datasets, key: str, y: str, *, values: Mapping[
         if bool(chosen.any()):
             plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, color=color, size=size)
             ax.get_lines()[-1].set(label=name, zorder=0.3)
-    lines = branches_to_draw(data) if key == EXACT.key else []
+    lines = branches_of(data) if key == EXACT.key else []
+    lines = [one if int(one["period_number"]) <= 2 else one.isel(special=slice(0, 0)) for one in lines]
     plot.bifurcation(swept, *lines, ax, y=y, size=0.9 if swept.sizes["iterate"] > 100 else 1.1, linewidth=1.0)
-    mark_values(ax, values, words)
+    mark(ax, figure)
 
 
-def draw_both(canvas: Canvas, data: Datasets, *, values: Mapping[float, str], words: str) -> None:
-    """Draw the velocity at the section, of each flow; ``values`` and ``words`` as in `draw_diagram`."""
+def _draw(canvas: Canvas, data: Datasets, figure: str) -> None:
+    """The velocity at the section, by each flow."""
     grid = canvas.subplots(1, 2, sharey=True)
     for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-        draw_diagram(ax, data, flow.key, "v", values=values, words=words)
+        draw_diagram(ax, data, flow.key, "v", figure)
         ax.set_title(f"({letter}) {flow.title}")
     only_outer(grid)
     shared_legend(canvas)
@@ -107,8 +118,9 @@ def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:
     return many["period_number"].copy(data=far)
 
 
-def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = False) -> None:
-    """A dotted line with its number at each of these values, at the top or at the foot."""
+def mark(ax: Axes, figure: str, foot: bool = False) -> None:
+    """A dotted line with its number at each value that is ``MARKED``, at the top or at the foot."""
+    values, words = MARKED[figure]
     for i, (value, text) in enumerate(values.items()):
         ax.axvline(value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None)
         annotate(
@@ -123,28 +135,8 @@ def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = 
         )
 
 
-def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
-    """A short line at the foot for each grazing in closed form, so that it hides no jump that begins there."""
-    for i, place in enumerate(places):
-        ax.plot(
-            [place, place],
-            [0.0, 0.07],
-            color=plot.COLORS["third"],
-            linewidth=2.0,
-            transform=ax.get_xaxis_transform(),
-            zorder=1,
-            label="grazing, closed form" if i == 0 else None,
-            solid_capstyle="butt",
-        )
-
-
-def branches_to_draw(data: Datasets) -> list[xr.Dataset]:
-    """The branches of a figure, special points on those of period 1 and 2 only."""
-    return [one if int(one["period_number"]) <= 2 else one.isel(special=slice(0, 0)) for one in branches_of(data)]
-
-
 def how(data: Datasets) -> str:
-    """Settings of the sweeps, for a caption."""
+    """Branches and settings of the sweeps, for a caption."""
     words = []
     for flow in FLOWS:
         swept, many = data[flow.key], data[f"{flow.key}_starts"]
@@ -154,4 +146,100 @@ def how(data: Datasets) -> str:
             f"after {swept.attrs['transient']} periods; {many.sizes['start']} starts at {many.sizes[parameter]} "
             f"values, after {many.attrs['transient']} periods"
         )
-    return "Section at phase 0. " + "; ".join(words) + "."
+    return (
+        "Branches in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1; where they "
+        "are stable, the swept points lie on them. Special points are marked on those of period 1 and 2. Section at "
+        f"phase 0. {'; '.join(words)}."
+    )
+
+
+def _compute_17(settings: Settings) -> Datasets:
+    data = diagrams(settings, "fig17", (800, 300), FIGURE_18, PATIENCE)
+    for word, transient in {"short": 600, "long": 50_000}.items():  # how long chaos lasts just above grazing
+        data[f"exact_{word}"] = sweep(
+            EXACT.system(**FIGURE_17),
+            "omega",
+            [_JUST_ABOVE],
+            direction=None,
+            start=starts(16),
+            transient=transient,
+            keep=64,
+            progress=settings.progress,
+            **EXACT.options,
+        ).assign_attrs(transient=transient)
+    return data
+
+
+def _draw_17(canvas: Canvas, data: Datasets) -> None:
+    grid = canvas.subplots(2, 2, sharex=True, sharey="row")
+    for j, flow in enumerate(FLOWS):
+        for i, state in enumerate("xv"):
+            draw_diagram(grid[i, j], data, flow.key, state, "fig17")
+            ends = data[flow.key]["omega"].values[[0, -1]]
+            mark_grazing(grid[i, j], [omega for omega in grazing_of(data[flow.key]) if ends[0] < omega < ends[1]])
+        grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
+    many = data["exact_starts"]
+    for period, (low, high) in _windows(data).items():  # named above the highest of their points; in x above each other
+        top = many["section"].sel(state="v", omega=slice(low, high)).where(many["period_number"] == period).max()
+        annotate(grid[1, 0], f"period {period}", (0.5 * (low + high), float(top)), (0, 3), ha="center")
+    only_outer(grid)
+    shared_legend(canvas)
+
+
+def _windows(data: Datasets) -> dict[int, tuple[float, float]]:
+    """Periods above 1 that starts reach at frequencies above grazing, each with its lowest and highest frequency."""
+    above = data["exact_starts"].sel(omega=slice(_JUST_ABOVE, None))
+    periods = above["period_number"]
+    found = {}
+    for period in np.unique(periods.values[periods.values > 1]):
+        at = above["omega"].values[(periods == period).any("start").values]
+        found[int(period)] = (float(at[0]), float(at[-1]))
+    return found
+
+
+def _caption_17(data: Datasets) -> str:
+    grazing = ", ".join(f"{omega:.5f}" for omega in grazing_of(data["exact"]))
+    text = (
+        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 3.6 mm: displacement (above) and "
+        "velocity at the section. Dotted: the three frequencies of Fig. 18; green: closed-form grazing of the "
+        f"motion without contact ({grazing} rad/s; in (b) that of a gap g - eta). Above it chaos dies out, given time: "
+        "what has no period in (b) had no time to. "
+        "Grey shows motions that coexist with what the sweeps follow. "
+    )
+    if windows := _windows(data):
+        ends = {n: sorted({f"{low:.2f}", f"{high:.2f}"}) for n, (low, high) in windows.items()}
+        words = " and ".join(f"period {period} at {' to '.join(at)} rad/s" for period, at in ends.items())
+        text += (
+            f"The small hooks above grazing are narrow windows of further motions: {words}, each with motions of no "
+            "period at its lower end. "
+        )
+    return text + how(data)
+
+
+FIGURES = (
+    Figure(
+        "fig11",
+        11,
+        "Bifurcation diagram over the forcing amplitude",
+        partial(diagrams, figure="fig11", steps=(600, 300), also=FIGURE_12),
+        partial(_draw, figure="fig11"),
+        lambda data: (
+            "Bifurcation diagram over the forcing amplitude, omega = 3.69 rad/s, g = -4.5 mm: velocity at the section. "
+            "Dotted: the paper's printed ends of chaos (0.26 N), period 4 (0.28 N) and period 2 (0.406 N). " + how(data)
+        ),
+    ),
+    Figure(
+        "fig13",
+        13,
+        "Bifurcation diagram over the gap",
+        partial(diagrams, figure="fig13", steps=(700, 280), also=FIGURE_14),
+        partial(_draw, figure="fig13"),
+        lambda data: (
+            "Bifurcation diagram over the gap, omega = 11.15 rad/s, rho = 0.33 N: velocity at the section. Dotted: the "
+            "four gaps of Fig. 14. Grey shows motions that coexist with what the sweeps follow. " + how(data)
+        ),
+    ),
+    Figure(
+        "fig17", 17, "Bifurcation diagrams over the forcing frequency", _compute_17, _draw_17, _caption_17, (1.0, 0.76)
+    ),
+)

@@ -137,8 +137,7 @@ def finished(name: str, settings: Settings) -> Made | None:
     """
     folder = settings.place
     try:
-        record = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-        made_by, keys, seconds = dict(record["made_by"]), list(record["datasets"]), float(record["seconds"])
+        made_by = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))["made_by"]
         quick = bool(made_by["quick"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -148,7 +147,7 @@ def finished(name: str, settings: Settings) -> Made | None:
             "folder (--out)"
         )
     wanted = _made_by(settings)
-    return _loaded(folder, name, keys, seconds) if made_by in (wanted, wanted | {"full": True}) else None
+    return _loaded(folder, name) if made_by in (wanted, wanted | {"full": True}) else None
 
 
 def just_made(name: str, settings: Settings) -> Made:
@@ -159,19 +158,17 @@ def just_made(name: str, settings: Settings) -> Made:
     RuntimeError
         If it is not there, or damaged.
     """
-    folder = settings.place
-    record = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-    found = _loaded(folder, name, record["datasets"], record["seconds"])
+    found = _loaded(settings.place, name)
     if found is None:
-        raise RuntimeError(f"{folder}: datasets of {name} are not there, or damaged, although it was measured")
+        raise RuntimeError(f"{settings.place}: datasets of {name} are not there, or damaged, although it was measured")
     return found
 
 
-def _loaded(folder: Path, name: str, keys: Sequence[str], seconds: float) -> Made | None:
-
+def _loaded(folder: Path, name: str) -> Made | None:
     try:
-        return {key: load(folder / f"{name}_{key}.nc") for key in keys}, seconds
-    except (OSError, DataFileError):
+        record = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        return {key: load(folder / f"{name}_{key}.nc") for key in record["datasets"]}, float(record["seconds"])
+    except (OSError, DataFileError, ValueError, KeyError, TypeError):
         return None
 
 

@@ -1,8 +1,9 @@
-"""Steady motions of the virtual rig beside the model's: one record per setting, portraits in pairs, diagrams."""
+"""Steady motions of the virtual rig, one record per setting; Figs. 12, 14 and 18 on the rig: beside the model's."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,38 +13,48 @@ from matplotlib.axes import Axes
 from nonsmooth import System, plot
 from nonsmooth.identification.compare import measured_sections
 from nonsmooth.models import discontinuous_support
-from nonsmooth.plot import name_plane, prefixed, shade_zone, shared_legend
-from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
-from nonsmooth_savi2007.figures.portraits import QUANTITIES, titles
+from nonsmooth.plot import comparison_phase_portrait, name_plane, prefixed, shade_zone, shared_legend
+from nonsmooth_savi2007.figures.diagrams import PATIENCE
+from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, two_rows
+from nonsmooth_savi2007.figures.portraits import QUANTITIES, SHEETS
+from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import Laboratory, as_result
 from nonsmooth_savi2007.measure import period_word, period_words
+from nonsmooth_savi2007.rig.figures import SECTIONS
 
 #: The two sides of a sheet, the model above the rig.
 SIDES = {"theory": "model, identified", "measured": "virtual rig (synthetic)"}
-GRID = 384  # samples of an orbit in each forcing period: enough for the eye within a contact
+_GRID = 384  # samples of an orbit in each forcing period: enough for the eye within a contact
+
+#: Of the figures with steady records: what is varied, and the turns of a record in a quick and in a whole run.
+_RECORDED = {
+    12: ("rho", 60, 200),
+    14: ("g", 60, 100),
+    16: ("g", 300, 1500),
+    17: ("omega", 40, 60),
+    18: ("omega", 60, 200),
+}
 
 #: Measured motions and the settings that belong to them, by key.
 Motions: TypeAlias = "dict[str, tuple[xr.Dataset, dict[str, Any]]]"
 
 
-def motions(bench: Laboratory, number: int, values: Sequence[float], **options: Any) -> Motions:
+@cache
+def motions(bench: Laboratory, number: int) -> Motions:
     """Record what stands behind a figure and measure each run: the motion and its settings by ``<value>``.
 
     The runs follow the values, in turn; where they are gone through again, from other starts, the keys are
-    ``<value>_2``, ``<value>_3``, ...
+    ``<value>_2``, ``<value>_3``, ... Measured once: Figs. 13 and 14 share their records.
     """
-    session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **options))
-    found = {}
+    parameter, quick, whole = _RECORDED[number]
+    place = ("omega", "rho", "g").index(parameter)
+    values = [f"{setting[place]:g}" for setting in SECTIONS[number]]
+    made = bench.rig.figure(number, periods=quick if bench.quick else whole)
+    session, found = bench.record(f"fig{number:02d}", made), {}
     for i, run in enumerate(bench.with_support(session, "section")):
-        again, place = divmod(i, len(values))
-        key = f"{values[place]:g}" + (f"_{again + 1}" if again else "")
-        found[key] = bench.measured(session, "section", run)
+        again, at = divmod(i, len(values))
+        found[values[at] + (f"_{again + 1}" if again else "")] = bench.measured(session, "section", run)
     return found
-
-
-def compared(bench: Laboratory, found: Motions, **options: Any) -> Datasets:
-    """Each motion over the model's."""
-    return {key: bench.compare(motion, settings, **options) for key, (motion, settings) in found.items()}
 
 
 def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, Any]]:
@@ -94,11 +105,6 @@ def runs_of(found: Motions, parameter: str) -> xr.Dataset:
     return as_result(runs, f"steady runs over {parameter}")
 
 
-def without_flips(result: xr.Dataset) -> xr.Dataset:
-    """A diagram for a picture of steady runs: a few settings do not tell where a period doubles."""
-    return result.isel(flip=slice(0, 0)) if "flip" in result.dims else result
-
-
 def runs_at(data: Datasets, value: float) -> list[xr.Dataset]:
     """The comparisons of all runs at one value, in the order in which they were recorded."""
     key = f"{value:g}"
@@ -127,15 +133,25 @@ def said(data: Datasets, shown: Mapping[float, int], unit: str) -> str:
     return "; ".join(words)
 
 
-def draw_pairs(canvas: Canvas, data: Datasets, *, parameter: str, shown: Mapping[float, int]) -> None:
+def _compared(settings: Settings, number: int) -> Datasets:
+    """Each motion over the model's."""
+    options: dict[str, Any] = {"transient": 600 if settings.quick else PATIENCE} if number == 18 else {}
+    found = motions(settings.bench, number)
+    if number == 14:  # at each gap the first record of each period number that its starts lead to
+        runs = runs_of(found, "g")
+        first = dict[tuple[float, int], str]()
+        names = ("run", "setting", "period_number")
+        for key, setting, period in zip(*(runs[name].values.tolist() for name in names), strict=True):
+            first.setdefault((setting, period), key)
+        found = {key: found[key] for key in first.values()}
+    return {key: settings.bench.compare(*one, grid=_GRID, **options) for key, one in found.items()}
+
+
+def _draw_pairs(canvas: Canvas, data: Datasets, number: int) -> None:
     """Draw the motion at each value (columns): the model above, the rig below, in the same axes."""
-    results = [chosen(data, value, wanted) for value, wanted in shown.items()]
-    two_rows(
-        canvas,
-        list(SIDES.values()),
-        titles(parameter, shown),
-        lambda ax, i, j: _portrait(ax, results[j], list(SIDES)[i]),
-    )
+    sheet, sides = SHEETS[number], list(SIDES)
+    results = [chosen(data, value, wanted) for value, wanted in sheet.shown.items()]
+    two_rows(canvas, list(SIDES.values()), sheet.titles, lambda ax, i, j: _portrait(ax, results[j], sides[i]))
     shared_legend(canvas)
 
 
@@ -173,3 +189,55 @@ def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
         )
     shade_zone(ax, float(result["g"]))
     name_plane(ax, result, "x", "v")
+
+
+def _draw_18(canvas: Canvas, data: Datasets, number: int) -> None:
+    grid = canvas.subplots(1, 3, sharey=True)
+    for ax, letter, (omega, wanted) in zip(grid, "abc", SHEETS[number].shown.items(), strict=True):
+        comparison_phase_portrait(chosen(data, omega, wanted), ax, zone="g")
+        ax.set_title(rf"({letter}) $\omega = {omega:g}$ rad/s", loc="left")
+    grid[0].autoscale(axis="y")  # no room for legends of their own
+    only_outer(grid)
+    shared_legend(canvas)
+
+
+def _figure(
+    number: int,
+    about: str,
+    draw: Callable[..., None] = _draw_pairs,
+    size: tuple[float, float] | None = None,
+) -> Figure:
+    sheet = SHEETS[number]
+    unit = QUANTITIES[sheet.parameter][0]
+    return Figure(
+        f"fig{number}_rig",
+        number,
+        f"State space over the {sheet.varied}",
+        partial(_compared, number=number),
+        partial(draw, number=number),
+        lambda data: f"State space {about} Rig: {said(data, sheet.shown, unit)}.",
+        size or sheet.size,
+        rig=True,
+    )
+
+
+FIGURES = (
+    _figure(
+        12,
+        "with section points at four amplitudes of Fig. 11, the model with the parameters identified (above) and the "
+        "virtual rig (synthetic, below); crosses: the model's section points; contact zone shaded.",
+    ),
+    _figure(
+        14,
+        "at the gaps of the paper's caption, the model with the parameters identified (above) and the virtual rig "
+        "(synthetic, below); crosses are the model's section points, the contact zone is shaded. Where starts lead to "
+        "several motions, that of the paper is drawn.",
+    ),
+    _figure(
+        18,
+        "at three frequencies of Fig. 17: the virtual rig (synthetic, dashed, section points black) over the model "
+        "with the parameters identified; the contact zone is shaded.",
+        _draw_18,
+        (1.0, 0.44),
+    ),
+)

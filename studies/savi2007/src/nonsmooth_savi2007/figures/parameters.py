@@ -91,10 +91,10 @@ def _caption_6(data: Datasets) -> str:
 
 def _caption_7(data: Datasets) -> str:
     found = found_in(data["drop"])
-    c_s = with_uncertainty(found.value, found.uncertainty)
     return (
         f"Free decay of the support with 1.33 kg on it. (a) One of {len(found.runs)} runs. (b) Logarithm of its "
-        f"turning points: damping ratio {found.others['damping_ratio']}, c_s = {c_s} N s/m, from all runs. "
+        f"turning points: damping ratio {found.others['damping_ratio']}, c_s = "
+        f"{with_uncertainty(found.value, found.uncertainty)} N s/m, from all runs. "
         "The paper: 0.0075 and 0.60 N s/m."
     )
 
@@ -110,21 +110,15 @@ def _caption_8(data: Datasets) -> str:
 
 
 def _compute_table(settings: Settings) -> Datasets:
-
     bench = settings.bench
     identified = bench.identified.to_dataset()  # first: it reads the session folder only
     truth = load_truth(bench.folder / TRUTH)
     truth |= {"omega_0": float(np.sqrt(2 * truth["k"] / truth["m"])), "gap_at_rest": truth["g"]}
     units = [UNITS.get(name, NAMES.get(name, ("",))[0]) for name in truth]
+    table = xr.Dataset({"value": ("name", list(truth.values())), "unit": ("name", units)}, {"name": list(truth)})
     return {
         "identified": identified,
-        "truth": as_result(
-            xr.Dataset(
-                {"value": ("name", list(truth.values())), "unit": ("name", units)},
-                {"name": list(truth)},
-            ),
-            "truth of the virtual rig",
-        ),
+        "truth": as_result(table, "truth of the virtual rig"),
         "sensors": bench.sensors(),
     }
 
@@ -133,12 +127,11 @@ def table_rows(data: Datasets) -> dict[str, tuple[str, Estimate, float]]:
     """Of each quantity of ``NAMES``: as the paper prints it ("" where it does not), as identified, and the truth."""
     identified, truth = ParameterSet.from_dataset(data["identified"]), data["truth"]
     found = {**identified.estimates, **identified.extra}
-    rows = {}
-    for name in NAMES:
-        if name in found:
-            printed = TABLE_1[name].text if name in TABLE_1 else ""
-            rows[name] = (printed, found[name], float(truth["value"].sel(name=name)))
-    return rows
+    return {
+        name: (TABLE_1[name].text if name in TABLE_1 else "", found[name], float(truth["value"].sel(name=name)))
+        for name in NAMES
+        if name in found
+    }
 
 
 def _draw_table(canvas: Canvas, data: Datasets) -> None:
@@ -146,31 +139,29 @@ def _draw_table(canvas: Canvas, data: Datasets) -> None:
     ax = canvas.subplots()
     ax.axvline(0, color=plot.COLORS["muted"], linewidth=0.6, zorder=0)
     for i, (name, (printed, number, truth)) in enumerate(rows.items()):
-        middle, half = (100 * (v / truth) for v in (number.value - truth, number.expanded))
         ax.errorbar(
-            middle,
+            100 * (number.value / truth - 1),
             i + 0.12,
-            xerr=half,
+            xerr=100 * number.expanded / truth,
             fmt="o",
             color=plot.COLORS["first"],
             markersize=3,
             capsize=1.5,
             elinewidth=0.8,
-            label="identified on the virtual rig (synthetic), 95 %" if i == 0 else None,
+            label=None if i else "identified on the virtual rig (synthetic), 95 %",
         )
         if printed:
-            value, rounding = TABLE_1[name].value, TABLE_1[name].rounding
             ax.errorbar(
-                100 * (value / truth - 1),
+                100 * (TABLE_1[name].value / truth - 1),
                 i - 0.2,
-                xerr=100 * rounding / truth,
+                xerr=100 * TABLE_1[name].rounding / truth,
                 fmt="s",
                 markersize=3,
                 color="black",
                 markerfacecolor="white",
                 capsize=1.5,
                 elinewidth=0.6,
-                label="printed in the paper, with its rounding" if i == 0 else None,
+                label=None if i else "printed in the paper, with its rounding",
             )
     ax.set_yticks(range(len(rows)), [NAMES[name][1] for name in rows])
     ax.set_ylim(len(rows) - 0.5, -0.5)

@@ -5,7 +5,7 @@ On the virtual rig frequency steps, over the response of the model with the para
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -16,7 +16,6 @@ from matplotlib.axes import Axes
 from nonsmooth import frequency_response, plot
 from nonsmooth.plot import annotate, comparison_response, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
-from nonsmooth_savi2007.figures.diagrams import mark_grazing
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth_savi2007.grazing import grazing_frequencies
@@ -31,6 +30,26 @@ def grazing_of(response: xr.Dataset) -> list[float]:
     parameters = {name: float(response[name]) for name in ("m", "k", "c", "rho", "g")}
     band = float(response["eta"]) if "eta" in response.coords else 0.0
     return grazing_frequencies({**parameters, "g": parameters["g"] - band})
+
+
+def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
+    """A short line at the foot for each grazing in closed form, so that it hides no jump that begins there."""
+    for i, place in enumerate(places):
+        ax.plot(
+            [place, place],
+            [0.0, 0.07],
+            color=plot.COLORS["third"],
+            linewidth=2.0,
+            transform=ax.get_xaxis_transform(),
+            zorder=1,
+            label="grazing, closed form" if i == 0 else None,
+            solid_capstyle="butt",
+        )
+
+
+def branches_to_draw(data: Datasets) -> list[xr.Dataset]:
+    """The branches of a figure, special points on those of period 1 and 2 only."""
+    return [one if int(one["period_number"]) <= 2 else one.isel(special=slice(0, 0)) for one in branches_of(data)]
 
 
 def _compute(settings: Settings, name: str) -> Datasets:
@@ -49,43 +68,37 @@ def _compute(settings: Settings, name: str) -> Datasets:
     return data | branches(name)
 
 
-def _draw(canvas: Canvas, data: Datasets, printed: Mapping[str, float]) -> None:
+def _draw(canvas: Canvas, data: Datasets, printed: Sequence[float]) -> None:
+    """Each flow's response with grazing frequencies, the range of period 2, and the paper's numbers."""
     grid = canvas.subplots(1, 2, sharey=True)
     for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
         response = data[flow.key]
-        found = branches_of(data) if flow is EXACT else []
-        plot.frequency_response(response, *found, ax)
-        _mark(ax, response, printed)
+        plot.frequency_response(response, *(branches_of(data) if flow is EXACT else []), ax)
+        mark_grazing(ax, grazing_of(response))
+        doubled = (response["period_number"] == 2).any("direction").values
+        if doubled.any():
+            ax.fill_between(
+                response["omega"].values,
+                0,
+                1,
+                where=doubled,
+                transform=ax.get_xaxis_transform(),
+                color=plot.COLORS["zone"],
+                alpha=0.25,
+                linewidth=0,
+                zorder=0,
+                label="period 2",
+            )
+        _mark_printed(ax, printed)
+        ax.margins(y=0.12)
         ax.set_title(f"({letter}) {flow.title}", y=1.0, pad=14 if printed else 6)
     only_outer(grid)
     shared_legend(canvas)
 
 
-def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
-    """Grazing frequencies, the range of period 2, and the paper's numbers at the upper edge."""
-    mark_grazing(ax, grazing_of(response))
-    omega = response["omega"].values
-    doubled = (response["period_number"] == 2).any("direction").values
-    if doubled.any():
-        ax.fill_between(
-            omega,
-            0,
-            1,
-            where=doubled,
-            transform=ax.get_xaxis_transform(),
-            color=plot.COLORS["zone"],
-            alpha=0.25,
-            linewidth=0,
-            zorder=0,
-            label="period 2",
-        )
-    mark_printed(ax, printed)
-    ax.margins(y=0.12)
-
-
-def mark_printed(ax: Axes, printed: Mapping[str, float]) -> None:
+def _mark_printed(ax: Axes, printed: Sequence[float]) -> None:
     """The paper's numbers at the upper edge."""
-    for i, value in enumerate(printed.values()):
+    for i, value in enumerate(printed):
         ax.plot(
             value,
             1.0,
@@ -95,25 +108,21 @@ def mark_printed(ax: Axes, printed: Mapping[str, float]) -> None:
             markersize=4,
             clip_on=False,
             label="printed in the paper (rad/s)" if i == 0 else None,
-            linestyle="none",
         )
         annotate(ax, f"{value:.2f}", (value, 1.0), (0, 3.5), xycoords=ax.get_xaxis_transform(), ha="center")
 
 
 def _caption(data: Datasets, printed: str) -> str:
-    exact, smoothed = data["exact"], data["smoothed"]
+    exact = data["exact"]
     grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
+    fine, coarse = (np.diff(data[flow.key]["omega"].values).max() for flow in FLOWS)
     return (
         f"Frequency response for rho = {float(exact['rho']):g} N and g = {1e3 * float(exact['g']):g} mm: half the "
         "peak-to-peak displacement with rising and falling frequency; arrows: jumps, with their frequencies. "
         "Branches in (a): periodic orbits of the exact flow, continued from one of them. "
         f"Closed-form grazing at {grazing} rad/s (green; in (b) of g - eta). Steps of "
-        f"{_step(exact):.4f} rad/s (exact) and {_step(smoothed):.4f} rad/s (smoothed; a shorter transient). {printed}"
+        f"{fine:.4f} rad/s (exact) and {coarse:.4f} rad/s (smoothed; a shorter transient). {printed}"
     )
-
-
-def _step(response: xr.Dataset) -> float:
-    return float(np.diff(response["omega"].values).max())
 
 
 def _measure(settings: Settings, number: int) -> Datasets:
@@ -137,19 +146,19 @@ def _steps(settings: Settings, number: int) -> dict[str, Any]:
     return {"voltages": [voltage_for(settings.bench.rig, float(omega)) for omega in omegas], **options}
 
 
-def _draw_rig(canvas: Canvas, data: Datasets, printed: Mapping[str, float]) -> None:
+def _draw_rig(canvas: Canvas, data: Datasets, printed: Sequence[float]) -> None:
     ax = canvas.subplots()
     comparison_response(data["compared"], ax)
-    mark_printed(ax, printed)
+    _mark_printed(ax, printed)
     shared_legend(canvas, columns=2)
 
 
 def _caption_rig(data: Datasets) -> str:
     runs, compared = data["runs"], data["compared"]
-    words = []
-    for direction, word in (("up", "rising"), ("down", "falling")):
-        found = ", ".join(str(jump) for jump in jumps(runs, direction)) or "none"
-        words.append(f"{word}: {found} rad/s")
+    words = [
+        f"{word}: {', '.join(map(str, jumps(runs, direction))) or 'none'} rad/s"
+        for direction, word in (("up", "rising"), ("down", "falling"))
+    ]
     doubled = int(np.count_nonzero(measured_periods(runs)[1] == 2))
     differences = 100 * np.abs(compared["relative_difference"].values)
     return (
@@ -162,10 +171,10 @@ def _caption_rig(data: Datasets) -> str:
     )
 
 
-_PRINTED_9 = {key: NUMBERS[key].value for key in ("period 2 near", "jump rising", "jump falling")}
-_SHOWN: tuple[tuple[int, str, dict[str, float], str], ...] = (
+_PRINTED_9 = [NUMBERS[key].value for key in ("period 2 near", "jump rising", "jump falling")]
+_SHOWN: tuple[tuple[int, str, Sequence[float], str], ...] = (
     (9, "Frequency response with a period-2 range", _PRINTED_9, "Triangles: printed in the paper."),
-    (10, "Frequency response with a small jump", {}, "The paper prints no numbers for this figure."),
+    (10, "Frequency response with a small jump", (), "The paper prints no numbers for this figure."),
 )
 
 FIGURES = tuple(

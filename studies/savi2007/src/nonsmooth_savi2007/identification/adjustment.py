@@ -83,6 +83,11 @@ class Observation(NamedTuple):
     values: FloatArray
     covariance: FloatArray
 
+    @classmethod
+    def of(cls, name: str, value: float, uncertainty: float) -> Observation:
+        """A single value with its standard uncertainty."""
+        return cls((name,), np.array([value]), np.array([[uncertainty**2]]))
+
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
@@ -103,19 +108,19 @@ class Adjusted:
     labels: tuple[str, ...]
 
     def __getitem__(self, name: str) -> float:
-        return float(self.values[self.names.index(name)])
+        return self.values[self.names.index(name)]
 
     def estimate(self, name: str) -> Estimate:
         """An unknown with its standard uncertainty; the support's damping is known to a factor."""
         i = self.names.index(name)
-        error = float(np.sqrt(self.covariance[i, i]))
+        error = np.sqrt(self.covariance[i, i])
         return Estimate(self[name], error, UNKNOWNS[name], logarithmic=name == "c_s")
 
     def ratio(self, name: str, other: str) -> Estimate:
         """One unknown over another."""
         i, j, value = self.names.index(name), self.names.index(other), self[name] / self[other]
         row = np.array([1 / self[name], -1 / self[other]])
-        return Estimate(value, value * float(np.sqrt(row @ self.covariance[np.ix_([i, j], [i, j])] @ row)))
+        return Estimate(value, value * np.sqrt(row @ self.covariance[np.ix_([i, j], [i, j])] @ row))
 
     def known(self, name: str) -> Estimate | None:
         """The estimate of an unknown that may not be determined."""
@@ -142,8 +147,7 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     if "mass" not in labels:
         raise ValueError("the mass of the car is needed: motions tell only ratios to it; weigh it")
     if {"spring_slope", "support_slope"}.intersection(labels):
-        prior = np.array([[max(uniform(gain_limit), 1e-12) ** 2]])
-        observations = [*observations, Observation(("gain",), np.array([1.0]), prior)]
+        observations = [*observations, Observation.of("gain", 1.0, max(uniform(gain_limit), 1e-12))]
         labels.append("gain")
     y = np.concatenate([o.values for o in observations])
     covariance = block_diag(*(o.covariance for o in observations))
@@ -182,7 +186,7 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     pulls = dict[str, float]()
     for i, label in enumerate(labels):
         if label != "gain":
-            pulls[label if label not in pulls else f"{label} ({i})"] = float(left[i])
+            pulls[label if label not in pulls else f"{label} ({i})"] = left[i]
     birge = float(np.sqrt(chi2 / freedom)) if freedom > 0 else float("nan")
     influence = np.linalg.solve(normal, jacobian.T @ weight) * scale[:, None] / size
     found = np.linalg.inv(normal) * np.outer(scale, scale)

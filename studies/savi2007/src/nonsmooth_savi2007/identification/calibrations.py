@@ -48,14 +48,14 @@ def scattered_line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[Str
     def fitted(s: float) -> StraightLine:
         weight = 1.0 / np.hypot(error, s)
         (slope, intercept), covariance = np.polyfit(x, y, 1, w=weight, cov="unscaled")
-        chi2 = float(np.sum((weight * (y - intercept - slope * x)) ** 2))
-        return StraightLine(float(slope), float(intercept), covariance, chi2 / max(len(x) - 2, 1))
+        chi2 = np.sum((weight * (y - intercept - slope * x)) ** 2)
+        return StraightLine(slope, intercept, covariance, chi2 / max(len(x) - 2, 1))
 
     line = fitted(0.0)
     if len(y) < 3 or line.reduced <= 1:
         return line, 0.0
     high = np.std(y - np.polyval(np.polyfit(x, y, 1), x)) * np.sqrt(len(y)) + error.max()
-    s = float(brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high))
+    s = brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high)
     return fitted(s), s
 
 
@@ -79,32 +79,32 @@ def voltage_frequency(runs: Sequence[Run]) -> Finding:
         If there are fewer than three different voltages.
     """
     volts = np.array([float(run.settings["voltage"]) for run in runs])
-    _enough(volts, "voltages")
     drives = [drive_phase(run.passages) for run in runs]
     omega = np.array([drive.omega for drive in drives])
     error = np.array([drive.omega_error for drive in drives])
-    line, scatter = scattered_line(volts, omega, error)
+    line, scattered, data = _calibrated(
+        "voltages", runs, volts, omega, error, ("motor voltage", "V"), ("frequency", "rad/s")
+    )
     slope, intercept = line.slope, line.intercept
     offset = -intercept / slope
-    # slope, offset = -intercept / slope, intercept
+    # of slope, offset and intercept
     jacobian = np.array([[1.0, 0.0], [intercept / slope**2, -1 / slope], [0.0, 1.0]])
     covariance = jacobian @ line.covariance @ jacobian.T
     errors = np.sqrt(np.diag(covariance))
     notes = [f"the motor turns from {offset:.3f} V on; omega = {slope:.5g} rad/(s V) x (V - {offset:.4g} V)"]
-    notes += _scatter(scatter, error, "rad/s")
     return Finding(
         "voltage_frequency",
-        Estimate(slope, float(errors[0]), "rad/(s V)"),
+        Estimate(slope, errors[0], "rad/(s V)"),
         "straight line with an offset through the frequencies that the photogate tells (Fig. 8a)",
-        int(sum(len(run.passages) for run in runs)),
+        sum(len(run.passages) for run in runs),
         tuple(run.name for run in runs),
-        tuple(notes),
+        (*notes, *scattered),
         {
-            "offset": Estimate(offset, float(errors[1]), "V"),
-            "intercept": Estimate(intercept, float(errors[2]), "rad/s"),
+            "offset": Estimate(offset, errors[1], "V"),
+            "intercept": Estimate(intercept, errors[2], "rad/s"),
         },
         covariance,
-        _data(volts, omega, np.hypot(error, scatter), line, ("motor voltage", "V"), ("frequency", "rad/s"), runs),
+        data,
         "calibration",
     )
 
@@ -131,15 +131,16 @@ def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | 
     ValueError
         If there are fewer than three different lengths, or a run is shorter than two turns.
     """
-    length = np.array([float(run.settings["crank_length"]) for run in runs])
-    _enough(length, "crank lengths")
+    length = np.array([run.crank for run in runs])
     force, error = np.zeros(len(runs)), np.zeros(len(runs))
     for i, run in enumerate(runs):
-        fitted = harmonics_of(run, np.asarray(run.force["time"].values, float), run.force)[0]
-        force[i], error[i] = float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
-    line, scatter = scattered_line(length, force, error)
-    type_a, half = float(np.sqrt(line.covariance[0, 0])), gain_limit * line.slope
-    total = float(np.hypot(type_a, uniform(half)))
+        fitted, *_ = harmonics_of(run, run.force)
+        force[i], error[i] = fitted.amplitudes[0], fitted.amplitude_errors[0]
+    line, scattered, data = _calibrated(
+        "crank lengths", runs, length, force, error, ("crank length", "m"), ("forcing amplitude", "N")
+    )
+    type_a, half = np.sqrt(line.covariance[0, 0]), gain_limit * line.slope
+    total = np.hypot(type_a, uniform(half))
     notes = [
         f"type A {type_a:.2g} N/m; type B {uniform(half):.2g} N/m, the sensor's gain within ±{100 * gain_limit:g} %",
         f"rho = 0.14 N is a crank of {1e3 * (0.14 - line.intercept) / line.slope:.2f} mm",
@@ -147,59 +148,51 @@ def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | 
     if k is not None:
         off = (line.slope - k.value) / np.hypot(total, k.uncertainty)
         notes.append(f"k = {k} from elsewhere: {100 * (line.slope / k.value - 1):+.2f} %, {abs(off):.1f} uncertainties")
-    notes += _scatter(scatter, error, "N")
     return Finding(
         "crank_force",
         Estimate(line.slope, total, "N/m", half_width=half),
         "straight line through the fundamentals of the force on the held car (Fig. 8b)",
-        int(sum(run.force.size for run in runs)),
+        sum(run.force.size for run in runs),
         tuple(run.name for run in runs),
-        tuple(notes),
+        (*notes, *scattered),
         {
             "slope_a": Estimate(line.slope, type_a, "N/m"),
-            "intercept": Estimate(line.intercept, float(np.sqrt(line.covariance[1, 1])), "N"),
+            "intercept": Estimate(line.intercept, np.sqrt(line.covariance[1, 1]), "N"),
         },
-        data=_data(
-            length, force, np.hypot(error, scatter), line, ("crank length", "m"), ("forcing amplitude", "N"), runs
-        ),
+        data=data,
         plot="calibration",
     )
 
 
-def _enough(settings: FloatArray, what: str) -> None:
-    n = len(np.unique(settings))
-    if n < 3:
-        raise ValueError(f"a calibration needs runs at three different {what} or more, got {n}")
-
-
-def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
-    if scatter <= 2 * np.median(error):
-        return []
-    return [
-        f"the points scatter by {scatter:.2g} {unit} about the line, more than their own errors of "
-        f"{np.median(error):.2g} {unit}; it is taken as common to all"
-    ]
-
-
-def _data(
+def _calibrated(
+    settings: str,
+    runs: Sequence[Run],
     setting: FloatArray,
     reading: FloatArray,
     error: FloatArray,
-    line: StraightLine,
     named: tuple[str, str],
     read: tuple[str, str],
-    runs: Sequence[Run],
-) -> xr.Dataset:
+) -> tuple[StraightLine, list[str], xr.Dataset]:
+    """The line through the points, a sentence where they scatter, and its picture: name and unit of both axes."""
+    if (n := len(np.unique(setting))) < 3:
+        raise ValueError(f"a calibration needs runs at three different {settings} or more, got {n}")
+    line, scatter = scattered_line(setting, reading, error)
+    notes = []
+    if scatter > 2 * np.median(error):
+        notes.append(
+            f"the points scatter by {scatter:.2g} {read[1]} about the line, more than their own errors of "
+            f"{np.median(error):.2g} {read[1]}; it is taken as common to all"
+        )
     fine = np.linspace(min(setting.min(), 0.0), setting.max(), 200)
     rows = np.column_stack([fine, np.ones_like(fine)])
     reach = ndtri(0.975) * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
     fitted, errors = line.intercept + line.slope * fine, np.sqrt(np.diag(line.covariance))
-    unit = {"units": read[1], "long_name": read[0]}
-    return xr.Dataset(
+    unit, over = ({"units": units, "long_name": name} for name, units in (read, named))
+    data = xr.Dataset(
         {
-            "setting": ("run", setting, {"units": named[1], "long_name": named[0]}),
+            "setting": ("run", setting, over),
             "reading": ("run", reading, unit),
-            "reading_error": ("run", error, unit),
+            "reading_error": ("run", np.hypot(error, scatter), unit),
             "fitted": ("setting_fine", fitted, unit),
             "fitted_low": ("setting_fine", fitted - reach, unit),
             "fitted_high": ("setting_fine", fitted + reach, unit),
@@ -208,6 +201,7 @@ def _data(
             "intercept": ((), line.intercept, unit),
             "intercept_error": ((), errors[1], unit),
         },
-        {"setting_fine": ("setting_fine", fine, {"units": named[1], "long_name": named[0]})},
+        {"setting_fine": ("setting_fine", fine, over)},
         {"synthetic": "yes" if any(run.synthetic for run in runs) else "no"},
     )
+    return line, notes, data

@@ -109,8 +109,7 @@ def identify(
     evidence = gather(recordings, apparatus=apparatus)
     chain = _Chain(evidence)
     check_plausible(evidence)
-    for note in evidence.notes:
-        chain.say(note)
+    chain.say(*evidence.notes)
     chain.motor()
     chain.taps()
     chain.response()
@@ -124,8 +123,7 @@ def identify(
     if chain.contacts is not None and chain.decay is not None:
         gap = refer(evidence, chain.decay, chain.contacts, adjusted, chain.seen, crank_length)
         chain.findings.append(gap.finding(chain.contacts))
-        for note in (*gap.notes, *gap.counted.notes):
-            chain.say(note)
+        chain.say(*gap.notes, *gap.counted.notes)
     chain.checks(adjusted)
     chain.doubts(adjusted)
     found = joined(
@@ -156,7 +154,7 @@ class _Chain:
     """The procedures in their order, with what they observed, found and could not use."""
 
     def __init__(self, evidence: Evidence) -> None:
-        self.evidence, self.runs, self.resolution = evidence, evidence.runs, evidence.resolution
+        self.evidence, self.runs = evidence, evidence.runs
         self.mass, limit = evidence.quantity("mass"), evidence.apparatus.get("force_gain_limit")
         self.gain_limit = 0.01 if limit is None else limit.value
         self.findings: list[Finding] = []
@@ -176,7 +174,7 @@ class _Chain:
             raise ValueError(
                 f"the notebook states no uncertainty of `{name}`; write {{ value = ..., uncertainty = ... }}"
             )
-        return Observation((name,), np.array([quantity.value]), np.array([[quantity.uncertainty**2]]))
+        return Observation.of(name, quantity.value, quantity.uncertainty)
 
     def beside(self, what: str, find: Callable[[], Finding | list[Finding]]) -> Finding | None:
         """Make a finding that no parameter rests on; on failure, record a note and continue."""
@@ -194,20 +192,21 @@ class _Chain:
         self.findings.append(found)
         return found
 
-    def say(self, sentence: str) -> None:
-        self.notes.append(sentence)
-        warnings.warn(sentence, RecordingWarning, stacklevel=5)
+    def say(self, *sentences: str) -> None:
+        self.notes += sentences
+        for sentence in sentences:
+            warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
-    def doubt(self, sentence: str) -> None:
+    def doubt(self, *sentences: str) -> None:
         """Say what contradicts itself: a parameter may be wrong by more than its uncertainty."""
-        self.anomalies.append(sentence)
-        warnings.warn(sentence, RecordingWarning, stacklevel=5)
+        self.anomalies += sentences
+        for sentence in sentences:
+            warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
     def doubts(self, adjusted: Adjusted) -> None:
         """Anomalies: impossible values, disagreements, and procedures of which most runs could not be used."""
         self.unused()
-        for sentence in filter(None, [disagreement(adjusted), *impossible(adjusted)]):
-            self.doubt(sentence)
+        self.doubt(*filter(None, [disagreement(adjusted), *impossible(adjusted)]))
         if self.contacts is not None and self.contacts.poor:
             self.doubt(
                 f"contact: the motion is not that of the model: residuals {self.contacts.excess:.3g} times the "
@@ -247,20 +246,19 @@ class _Chain:
         if not runs:
             return
         with _of("impulse"):
-            self.decay = decay = free_decay(runs, resolution=self.resolution)
-        for sentence in (*(f"impulse: {note}" for note in decay.notes), *slipped_late(decay, self.resolution)):
-            self.say(sentence)
+            self.decay = decay = free_decay(runs)
+        self.say(*(f"impulse: {note}" for note in decay.notes), *slipped_late(decay))
         self.observations.append(Observation(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3]))
         self.beside("natural frequency (Fig. 5)", lambda: natural_frequency(decay))
-        self.beside("damping by free decay", lambda: decay_damping(decay, self.mass, resolution=self.resolution))
+        self.beside("damping by free decay", lambda: decay_damping(decay, self.mass))
 
     def response(self) -> None:
         """The steady runs without support, and the dampings found from them."""
-        free, decay = [run for run in self.runs["response"] if "gap" not in run.settings], self.decay
+        free, decay = [run for run in self.runs["response"] if not run.mounted], self.decay
         if mounted := len(self.runs["response"]) - len(free):
             self.say(f"{mounted} runs of the response state a gap: the support was mounted, no damping from them")
         self.seen = seen = steady(free)
-        if sentence := not_driven(seen, self.resolution):
+        if sentence := not_driven(seen):
             raise ValueError(sentence)
         if free and decay is not None:
             self.beside("damping by amplitude (Fig. 6)", lambda: amplitude_fit(seen, decay, self.mass))
@@ -274,17 +272,9 @@ class _Chain:
             ("support", "support_slope", 0.0, False),
         ):
             if runs := self.runs[procedure]:
-                found = stiffness(
-                    runs,
-                    resolution=self.resolution,
-                    mass=mass,
-                    gain_limit=self.gain_limit,
-                    friction=friction,
-                    name=law,
-                )
+                found = stiffness(runs, mass=mass, gain_limit=self.gain_limit, friction=friction, name=law)
                 self.findings.append(found)
-                variance = found.others["slope_a"].uncertainty ** 2
-                self.observations.append(Observation((law,), np.array([found.value]), np.array([[variance]])))
+                self.observations.append(Observation.of(law, found.value, found.others["slope_a"].uncertainty))
 
     def drop(self) -> None:
         runs = self.runs["drop"]
@@ -292,9 +282,8 @@ class _Chain:
             return
         mass = self.evidence.quantity("test_mass")
         with _of("drop"):
-            found, decay = support_damping(runs, resolution=self.resolution, test_mass=mass)
-        for note in decay.notes:
-            self.say(f"drop: {note}")
+            found, decay = support_damping(runs, test_mass=mass)
+        self.say(*(f"drop: {note}" for note in decay.notes))
         self.findings.append(found)
         self.observations += [
             self.weighed("test_mass"),
@@ -306,7 +295,7 @@ class _Chain:
         if runs and decay is not None and "k_s" in rough.names:
             self.grazing = self.beside(
                 "gap by the grazing frequency",
-                lambda: grazing_gap(runs, decay, resolution=self.resolution, kappa=rough["k_s"] / rough["m"]),
+                lambda: grazing_gap(runs, decay, kappa=rough["k_s"] / rough["m"]),
             )
 
     def mark(self, decay: DecayFit) -> float:
@@ -318,7 +307,7 @@ class _Chain:
 
     def contact(self) -> Finding | None:
         """Fit the runs with contact; what one contact tells by itself."""
-        runs, resolution, rough, decay = self.runs["contact"], self.resolution, self.adjusted(), self.decay
+        runs, rough, decay = self.runs["contact"], self.adjusted(), self.decay
         mark = 0.0 if decay is None else self.mark(decay)
         if not runs:
             return None
@@ -331,18 +320,17 @@ class _Chain:
         mass, kappa = rough.estimate("m"), rough.ratio("k_s", "m")
         gamma = rough["c_s"] / mass.value if "c_s" in rough.names else 1e-3 * kappa.value
         try:
-            found = shoot_contacts(runs, decay, resolution=resolution, kappa=kappa.value, gamma=gamma, mark=mark)
+            found = shoot_contacts(runs, decay, kappa=kappa.value, gamma=gamma, mark=mark)
         except SolveError as reason:
             self.say(f"contact: not used, so that the gap is not known: {reason}")
             return None
         self.contacts = found
-        for sentence in found.left:
-            self.say(sentence)
+        self.say(*found.left)
         self.observations.append(Observation(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5]))
-        self.findings.append(contact_finding(found, mass, resolution=resolution))
+        self.findings.append(contact_finding(found, mass))
         return self.beside(
             "c_s from one contact",
-            lambda: one_contact(found, decay, mass.value, resolution=resolution, kappa_error=kappa.uncertainty),
+            lambda: one_contact(found, decay, mass.value, kappa_error=kappa.uncertainty),
         )
 
     def calibrations(self, adjusted: Adjusted) -> None:
@@ -356,7 +344,7 @@ class _Chain:
         """Compare what the procedures say of one quantity; what disagrees is said."""
         at_rest = None
         if self.grazing is not None and self.contacts is not None and self.decay is not None:
-            counted = counted_gap(self.contacts, float(self.runs["grazing"][0].settings["gap"]))
+            counted = counted_gap(self.contacts, self.runs["grazing"][0].gap)
             if counted is None:
                 self.notes.append("the graze was sought at another setting of the screw: its gap is not compared")
             else:
@@ -371,5 +359,4 @@ class _Chain:
         )
         agree, disagree = sentences(found)
         self.notes += agree
-        for sentence in disagree:
-            self.doubt(sentence)
+        self.doubt(*disagree)

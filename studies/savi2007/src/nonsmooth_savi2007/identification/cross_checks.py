@@ -70,7 +70,7 @@ def birge_ratio(chi2: float, freedom: int) -> tuple[float, bool]:
 
     if freedom < 1:
         return float("nan"), True
-    return float(np.sqrt(chi2 / freedom)), bool(distribution.sf(chi2, freedom) >= CHANCE)
+    return np.sqrt(chi2 / freedom), bool(distribution.sf(chi2, freedom) >= CHANCE)
 
 
 def consistent(values: Any, covariances: Any) -> Consistent:
@@ -98,7 +98,7 @@ def consistent(values: Any, covariances: Any) -> Consistent:
         covariance = np.linalg.inv(weights[rows].sum(axis=0))
         mean = covariance @ np.einsum("ijk,ik->j", weights[rows], scaled[rows])
         off = scaled[rows] - mean
-        return float(np.einsum("ij,ijk,ik->", off, weights[rows], off)), mean, covariance
+        return np.einsum("ij,ijk,ik->", off, weights[rows], off), mean, covariance
 
     rows = list(range(n))
     while True:
@@ -273,7 +273,7 @@ def sentences(checks: Sequence[Check]) -> tuple[list[str], list[str]]:
 def _off(one: Estimate, other: Estimate, common: float) -> float:
     """Difference over its uncertainty, without the relative uncertainty that both share; beyond limits, if any."""
     if (one.logarithmic or other.logarithmic) and one.value > 0 and other.value > 0:
-        difference = float(np.log(one.value / other.value))
+        difference = np.log(one.value / other.value)
         square = one.relative**2 + other.relative**2 - 2 * common**2
     else:
         difference = one.value - other.value
@@ -282,5 +282,5 @@ def _off(one: Estimate, other: Estimate, common: float) -> float:
         difference = np.sign(difference) * max(abs(difference) - other.half_width, 0.0)
         square = one.uncertainty**2
     if square <= 0:
-        return float("inf") * difference if difference else 0.0
-    return float(difference / np.sqrt(square))
+        return np.inf * difference if difference else 0.0
+    return difference / np.sqrt(square)

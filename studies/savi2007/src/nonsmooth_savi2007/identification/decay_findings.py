@@ -44,7 +44,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
-from nonsmooth_savi2007.identification.free_decay import DecayFit, free_decay
+from nonsmooth_savi2007.identification.free_decay import Decay, DecayFit, free_decay
 from nonsmooth_savi2007.identification.picture_data import picture_data
 
 _SLOWEST = 0.02  # m/s, of the slowest half swing of the test mass that is used
@@ -72,15 +72,15 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
     low, high = about - step, about + step
     for _ in range(3):
         f, magnitude = _between(time, x, low, high)
-        top = int(np.clip(np.argmax(magnitude), 1, FINE - 2))
-        low, high = float(f[top - 1]), float(f[top + 1])
+        top = np.clip(np.argmax(magnitude), 1, FINE - 2)
+        low, high = f[top - 1], f[top + 1]
     at = 0.5 * (low + high)
     wave = np.exp(-2j * np.pi * at * time)
     value, first, second = (np.sum((-2j * np.pi * time) ** n * x * wave) for n in range(3))
     bend = 2 * ((np.conj(value) * second).real + abs(first) ** 2)
-    delay = float((1j * first / value).real) / (2 * np.pi)
+    delay = (1j * first / value).real / (2 * np.pi)
     own = 2 * np.pi * noise * np.sqrt(np.sum((time - delay) ** 2))
-    return at, float(np.sqrt(2) * abs(value) * own / abs(bend))
+    return at, np.sqrt(2) * abs(value) * own / abs(bend)
 
 
 def _between(time: FloatArray, x: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
@@ -104,7 +104,7 @@ def natural_frequency(decay: DecayFit) -> Finding:
         :math:`\omega_0` (rad/s). ``others``: ``dft_grid``, the largest value of a DFT of 2048 samples, known to half a
         step; ``dft_peak``, its peak by interpolation; ``dft_undamped``, :math:`\sqrt{\omega_p^2 + b^2/2}` from it.
     """
-    largest = max(range(len(decay.parts)), key=lambda i: float(np.ptp(decay.parts[i].run.positions)))
+    largest = max(range(len(decay.parts)), key=lambda i: np.ptp(decay.parts[i].run.positions))
     run, begin, end = decay.parts[largest]
     time, x = run.time, run.positions - decay.rest
     rate = (len(time) - 1) / (time[-1] - time[0])
@@ -112,13 +112,13 @@ def natural_frequency(decay: DecayFit) -> Finding:
     frequency = np.fft.rfftfreq(GRID, 1 / rate)
     grid_step = rate / GRID
     top = 1 + int(np.argmax(magnitude[1:]))
-    peak, spread = spectral_peak(time, x, float(frequency[top]), grid_step, decay.noise)
+    peak, spread = spectral_peak(time, x, frequency[top], grid_step, decay.noise)
     (value, b, _), error = decay.law, decay.error("omega_0")
     fitted = np.full(len(x), np.nan)
     fitted[begin:end] = decay.fitted(largest) - decay.rest
     grid = 2 * np.pi * grid_step
     at_peak, peak_error = 2 * np.pi * peak, 2 * np.pi * spread
-    undamped = float(np.sqrt(at_peak**2 + b**2 / 2))
+    undamped = np.sqrt(at_peak**2 + b**2 / 2)
     below = grid * np.floor(value / grid)
     notes = (
         f"the largest value of a DFT of {GRID} samples stands at {frequency[top]:.4f} Hz, "
@@ -131,7 +131,7 @@ def natural_frequency(decay: DecayFit) -> Finding:
         "domain: the rest is dry friction's",
         *decay.notes,
     )
-    fine, between = _between(time, x, float(frequency[max(top - 12, 1)]), float(frequency[top + 12]))
+    fine, between = _between(time, x, frequency[max(top - 12, 1)], frequency[top + 12])
     data = picture_data(
         [run],
         {
@@ -152,7 +152,7 @@ def natural_frequency(decay: DecayFit) -> Finding:
         decay.runs,
         notes,
         {
-            "dft_grid": Estimate(2 * np.pi * float(frequency[top]), grid / np.sqrt(12), "rad/s", half_width=grid / 2),
+            "dft_grid": Estimate(2 * np.pi * frequency[top], grid / np.sqrt(12), "rad/s", half_width=grid / 2),
             "dft_peak": Estimate(at_peak, peak_error, "rad/s"),
             "dft_undamped": Estimate(undamped, peak_error * at_peak / undamped, "rad/s"),
         },
@@ -171,7 +171,7 @@ def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float)
     return np.maximum((first + below) * np.exp(-b * np.asarray(time) / 2) - below, 0.0)
 
 
-def decay_damping(decay: DecayFit, mass: Quantity, *, resolution: float) -> Finding:
+def decay_damping(decay: DecayFit, mass: Quantity) -> Finding:
     r"""Viscous damping and dry friction from the shape of free decays, with the decrement of the same decays beside it.
 
     Parameters
@@ -180,8 +180,6 @@ def decay_damping(decay: DecayFit, mass: Quantity, *, resolution: float) -> Find
         Of the taps, by `free_decay`.
     mass : Quantity
         Mass (kg) with its standard uncertainty.
-    resolution : float
-        Length of a count (m).
 
     Returns
     -------
@@ -189,24 +187,22 @@ def decay_damping(decay: DecayFit, mass: Quantity, *, resolution: float) -> Find
         c (N s/m). ``others``: ``friction`` (N), ``c_viscous_only`` by the logarithmic decrement of the same
         decays; ``covariance`` is that of c and friction.
     """
-    peaks = []
-    for run, first, last in decay.parts:  # the first turning point lies within a sample of where the fit begins
-        used = slice(max(first - 3, 0), last)
-        peaks.append(log_decrement(run.time[used], run.positions[used], decay.rest, resolution=resolution))
+    # the first turning point lies within a sample of where the fit begins
+    peaks = [log_decrement(part._replace(first=max(part.first - 3, 0)), decay.rest) for part in decay.parts]
     lines = [decay_rate(*row) for row in peaks if len(row[0]) > 2]
     if not lines:
         raise SolveError(
-            f"no tap has three turning points that stand {resolution:g} m apart, so its decrement is not known: a "
-            "motion that does not decay, or a length on the pulley that is wrong"
+            f"no tap has three turning points that stand {decay.parts[0].run.resolution:g} m apart, so its decrement "
+            "is not known: a motion that does not decay, or a length on the pulley that is wrong"
         )
     plain = _damping(lines, mass)
     own = mass.value**2 * decay.covariance[1:3, 1:3]
     covariance = own + mass.uncertainty**2 * np.outer(decay.values[1:3], decay.values[1:3])
     c, friction = (
-        Estimate(mass.value * value, float(np.sqrt(variance)), unit)
+        Estimate(mass.value * value, np.sqrt(variance), unit)
         for value, variance, unit in zip(decay.law[1:], np.diag(covariance), ("N s/m", "N"), strict=True)
     )
-    related = float(own[0, 1] / np.sqrt(own[0, 0] * own[1, 1])) if own[1, 1] else 0.0
+    related = own[0, 1] / np.sqrt(own[0, 0] * own[1, 1]) if own[1, 1] else 0.0
     return Finding(
         "c_decay",
         c,
@@ -229,7 +225,7 @@ def decay_damping(decay: DecayFit, mass: Quantity, *, resolution: float) -> Find
 def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate, friction: Estimate) -> xr.Dataset:
     """The widest decay with its turning points and both envelopes."""
     natural, b, f = decay.law
-    which = max(range(len(peaks)), key=lambda i: float(np.ptp(decay.parts[i].x)))
+    which = max(range(len(peaks)), key=lambda i: np.ptp(decay.parts[i].x))
     part, (at, height, error) = decay.parts[which], peaks[which]
     time = part.time
     # the first turning point after the first fitted sample, and its height, to second order
@@ -240,7 +236,7 @@ def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate,
     at = at - begun
     fine = np.linspace(0.0, float(at[-1]), 200)
     plain = np.exp(intercept + slope * (begun + fine))
-    both = envelope(fine, float(abs(first) * (1 + (natural * late) ** 2 / 2)), natural, b, f)
+    both = envelope(fine, abs(first) * (1 + (natural * late) ** 2 / 2), natural, b, f)
     return picture_data(
         [part.run],
         {
@@ -257,12 +253,12 @@ def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate,
     )
 
 
-def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: float) -> tuple[FloatArray, ...]:
+def log_decrement(part: Decay, rest: float) -> tuple[FloatArray, ...]:
     """Times, heights and errors of the turning points of a decay, each by a parabola through five samples.
 
     Only points higher than ten counts are taken.
     """
-    away = x - rest
+    time, away, resolution = part.time, part.x - rest, part.run.resolution
     size = np.abs(away)
     top = (size[2:-2] >= size[1:-3]) & (size[2:-2] > size[3:-1]) & (size[2:-2] >= 10 * resolution)
     rows = []
@@ -282,33 +278,31 @@ def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: f
 def decay_rate(t: FloatArray, height: FloatArray, error: FloatArray) -> tuple[float, float, float]:
     """Slope (1/s) and intercept of the line through the logarithms of the heights, and the slope's variance."""
     line, covariance = np.polyfit(t, np.log(height), 1, w=height / error, cov=True)
-    return float(line[0]), float(line[1]), float(covariance[0, 0])
+    return *line.tolist(), covariance[0, 0]
 
 
 def _damping(lines: Sequence[tuple[float, float, float]], mass: Quantity, spread: float = 0.0) -> Estimate:
     """Damping constant by lines through the logarithms of heights; its rate is known no better than to ``spread``."""
     slopes, _, variances = np.transpose(lines)
-    error = max(2 / float(np.sqrt(np.sum(1 / variances))), spread)
-    rate = Estimate(-2 * float(np.average(slopes, weights=1 / variances)), error)
+    error = max(2 / np.sqrt(np.sum(1 / variances)), spread)
+    rate = Estimate(-2 * np.average(slopes, weights=1 / variances), error)
     return rate.times(mass.value, mass.uncertainty, "N s/m")
 
 
-def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quantity) -> tuple[Finding, DecayFit]:
+def support_damping(runs: Sequence[Run], *, test_mass: Quantity) -> tuple[Finding, DecayFit]:
     """Damping of the support with a test mass on it, and the fit of the whole decays.
 
     Parameters
     ----------
     runs : sequence of Run
         Free decays of the test mass.
-    resolution : float
-        Length of a count (m).
     test_mass : Quantity
         Its mass (kg).
     """
-    decay = free_decay(runs, resolution=resolution, slowest=_SLOWEST, friction=False)
+    decay = free_decay(runs, slowest=_SLOWEST, friction=False)
     notes, lines = list(decay.notes), []
     for part in decay.parts:
-        peaks = log_decrement(part.time, part.x, decay.rest, resolution=resolution)
+        peaks = log_decrement(part, decay.rest)
         if len(peaks[0]) < 4:
             notes.append(
                 f"run {part.run.name!r}: no logarithmic decrement, {len(peaks[0])} turning points above ten counts"
@@ -319,7 +313,7 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
         raise ValueError("no drop has four turning points above ten counts: drop it from higher, or record longer")
     mass, natural = test_mass.value, decay.law[0]
     rates = [line for _, _, line in lines]
-    spread = 2 * float(np.std([slope for slope, *_ in rates], ddof=1) / np.sqrt(len(rates))) if len(rates) > 1 else 0.0
+    spread = 2 * (np.std([slope for slope, *_ in rates], ddof=1) / np.sqrt(len(rates))) if len(rates) > 1 else 0.0
     c_s, ratio = _damping(rates, test_mass, spread), _damping(rates, Quantity(0.5 / natural), spread)
     run, (t, height, error), (slope, intercept, variance) = lines[0]
     data = picture_data(
@@ -335,8 +329,8 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
             },
         },
         intercept=intercept,
-        slope=Estimate(slope, float(np.sqrt(variance)), "1/s"),
-        damping_ratio=Estimate(-slope / natural, float(np.sqrt(variance)) / natural),
+        slope=Estimate(slope, np.sqrt(variance), "1/s"),
+        damping_ratio=Estimate(-slope / natural, np.sqrt(variance) / natural),
     )
     finding = Finding(
         "c_s_drop",

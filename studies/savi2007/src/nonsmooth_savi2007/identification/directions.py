@@ -46,7 +46,10 @@ def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, 
         rows = found.get(name, ())
         against = [run.name for run in rows if _slope(run) < 0]
         if against:
-            found[name] = tuple(_pushed(run) if run.name in against else run for run in rows)
+            found[name] = tuple(
+                replace(run, force=run.force.copy(data=-run.force.values)) if run.name in against else run
+                for run in rows
+            )
             which = "all" if len(against) == len(rows) else ", ".join(against)
             notes.append(
                 f"{name}: the force sensor counts against the displacement in {len(against)} of {len(rows)} runs "
@@ -69,7 +72,7 @@ def towards_support(runs: Sequence[Run]) -> tuple[int, str]:
     ValueError
         If the runs contradict one another.
     """
-    votes = {run: _vote(run) for run in runs if run.x is not None and "gap" in run.settings}
+    votes = {run: _vote(run) for run in runs if run.x is not None and run.mounted}
     up, down = ([run.label for run, vote in votes.items() if vote == sign] for sign in (1, -1))
     if min(len(up), len(down)) > 0.2 * (len(up) + len(down)):
         raise ValueError(
@@ -100,7 +103,7 @@ def _vote(run: Run) -> int:
 
 def _swapped(runs: Mapping[str, tuple[Run, ...]]) -> None:
     slopes = {name: [abs(_slope(run)) for run in runs.get(name, ())] for name in ("springs", "support")}
-    springs, support = (float(np.median([s for s in slopes[name] if s > 0] or [np.nan])) for name in slopes)
+    springs, support = (np.median([s for s in slopes[name] if s > 0] or [np.nan]) for name in slopes)
     if springs > support:
         raise ValueError(
             f"the pulls of 'springs' have a slope of {springs:.3g} N/m and the pushes of 'support' one of "
@@ -128,7 +131,3 @@ def few(names: Sequence[str]) -> str:
 
 def _turned(run: Run) -> Run:
     return run if run.x is None else replace(run, x=run.x.copy(data=-run.x.values))
-
-
-def _pushed(run: Run) -> Run:
-    return replace(run, force=run.force.copy(data=-run.force.values))

@@ -38,13 +38,14 @@ _PASSAGES = 3  # of the photogate: fewer give no frequency and no scatter
 class Run:
     """One run: settings, position x (m) and force (N) each over its time (s), times of the photogate (s).
 
-    ``x`` is a DataArray that knows its run and channel; ``time`` and ``positions`` are its arrays. ``backwards``: the
-    photogate's count falls.
+    ``x`` is a DataArray that knows its run and channel; ``time`` and ``positions`` are its arrays. ``resolution``:
+    length of a count of the rotary sensor (m); ``backwards``: the photogate's count falls.
     """
 
     procedure: str
     name: str
     settings: Mapping[str, Any]
+    resolution: float
     x: Any = None
     force: Any = None
     turns: FloatArray | None = None
@@ -69,6 +70,21 @@ class Run:
         return self.turns
 
     @property
+    def gap(self) -> float:
+        """Reading of the support's screw (m)."""
+        return float(self.settings["gap"])
+
+    @property
+    def crank(self) -> float:
+        """Length of the crank (m)."""
+        return float(self.settings["crank_length"])
+
+    @property
+    def mounted(self) -> bool:
+        """True where the support was mounted."""
+        return "gap" in self.settings
+
+    @property
     def label(self) -> str:
         """``response Run #3``."""
         return f"{self.procedure} {self.name}"
@@ -78,19 +94,16 @@ class Run:
 class Evidence:
     """Runs of every procedure, what is known of the apparatus, and what was turned (`oriented`).
 
-    ``direction`` is -1 where the rotary sensor counts away from the support: positions have the other sign then.
+    ``resolution`` is the length of a count (m); ``direction`` is -1 where the rotary sensor counts away from the
+    support: positions have the other sign then.
     """
 
     runs: Mapping[str, tuple[Run, ...]]
     apparatus: Mapping[str, Quantity]
-    synthetic: bool = False
-    direction: int = 1
-    notes: tuple[str, ...] = ()
-
-    @property
-    def resolution(self) -> float:
-        """Length of a count of the rotary sensor (m)."""
-        return abs(self.apparatus["distance_per_turn"].value) / round(self.apparatus["counts_per_turn"].value)
+    resolution: float
+    synthetic: bool
+    direction: int
+    notes: tuple[str, ...]
 
     def quantity(self, name: str) -> Quantity:
         """A number from the notebook.
@@ -153,24 +166,24 @@ def gather(
         known.setdefault(name, Quantity(default))
     if "distance_per_turn" not in known:
         raise ValueError("the apparatus must state `distance_per_turn` (m): the car's travel per turn of the wheel")
+    travel, counts = known["distance_per_turn"].value, round(known["counts_per_turn"].value)
     runs = {}
     for procedure, rows in taken.items():
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "the experiment", PROCEDURES.keys()))
-        runs[procedure] = tuple(_run(procedure, known, *row) for row in rows)
+        runs[procedure] = tuple(_run(procedure, travel, counts, *row) for row in rows)
     runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
     runs |= {procedure: () for procedure in PROCEDURES if procedure not in runs}
-    return Evidence(runs, known, synthetic, direction, notes)
+    return Evidence(runs, known, abs(travel) / counts, synthetic, direction, notes)
 
 
 def _rows(procedure: str, given: Any) -> list[Any]:
     rows: list[Any] = []
     for item in [given] if isinstance(given, Recording) else given:
         if isinstance(item, Recording):
-            for run in item.runs:
-                attrs = item.tree[run].attrs
-                rows.append((item, run, {key: attrs[key] for key in SETTINGS if key in attrs}))
+            attrs = {run: item.tree[run].attrs for run in item.runs}
+            rows += [(item, run, {key: told[key] for key in SETTINGS if key in told}) for run, told in attrs.items()]
         else:
             rows.append(tuple(item))
     if not rows:
@@ -179,7 +192,7 @@ def _rows(procedure: str, given: Any) -> list[Any]:
 
 
 def _run(
-    procedure: str, known: Mapping[str, Quantity], recording: Recording, name: str, settings: Mapping[str, Any]
+    procedure: str, travel: float, counts: int, recording: Recording, name: str, settings: Mapping[str, Any]
 ) -> Run:
     if lacking := [key for key in PROCEDURES[procedure] if key not in settings]:
         raise ValueError(f"{procedure}, run {name!r} must state {', '.join(lacking)} in its settings")
@@ -193,15 +206,11 @@ def _run(
 
     found: dict[str, Any] = {}
     if has("Angle"):
-        found["x"] = position(
-            take(recording, "Angle", name),
-            distance_per_turn=known["distance_per_turn"].value,
-            counts_per_turn=round(known["counts_per_turn"].value),
-        )
+        found["x"] = position(take(recording, "Angle", name), distance_per_turn=travel, counts_per_turn=counts)
     if has("Force"):
         found["force"] = take(recording, "Force", name, units=("N",))
     if has("Turn"):
         passages = take(recording, "Turn", name, samples=_PASSAGES)
         found["turns"] = np.asarray(passages["time"].values, float)
         found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, float)) < 0))
-    return Run(procedure, name, dict(settings), synthetic=recording.synthetic, **found)
+    return Run(procedure, name, dict(settings), abs(travel) / counts, synthetic=recording.synthetic, **found)

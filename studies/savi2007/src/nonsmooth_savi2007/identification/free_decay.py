@@ -20,6 +20,7 @@ References: J.P. Den Hartog, Trans. ASME 53 (1931) 107; B.F. Feeny and J.W. Lian
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -92,7 +93,7 @@ class DecayFit(NamedTuple):
     @property
     def samples(self) -> int:
         """Samples that entered."""
-        return int(self.fit.residuals.sizes["sample"])
+        return self.fit.residuals.sizes["sample"]
 
     @property
     def noise(self) -> float:
@@ -102,7 +103,7 @@ class DecayFit(NamedTuple):
     def error(self, name: str) -> float:
         """Standard uncertainty of one of the four."""
         i = _NAMES.index(name)
-        return float(np.sqrt(self.covariance[i, i]))
+        return np.sqrt(self.covariance[i, i])
 
     def fitted(self, which: int) -> FloatArray:
         """Fitted positions of one of the runs (m), in the sensor's count."""
@@ -115,7 +116,7 @@ class DecayFit(NamedTuple):
         return self.fit.extra[f"x(0){of}"].value, self.fit.extra[f"v_x(0){of}"].value
 
 
-def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float = SLOWEST) -> tuple[int, int]:
+def swing(run: Run, slowest: float = SLOWEST) -> tuple[int, int]:
     """First and last+1 sample of a decay that are to be used: from the first turning point to the last fast half swing.
 
     Raises
@@ -123,29 +124,25 @@ def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float 
     ValueError
         If the record holds no motion, or less than two half swings of that speed.
     """
-    away = x - float(np.median(x[-max(10, len(x) // 10) :]))
+    time, x = run.time, run.positions
+    away = x - np.median(x[-max(10, len(x) // 10) :])
     steps = np.diff(x)
-    moving = np.flatnonzero(np.abs(steps) > 2.5 * resolution)
-    if len(moving) == 0 or np.max(np.abs(away)) < 20 * resolution:
-        raise ValueError(f"the car moves by {np.max(np.abs(away)) / resolution:.0f} counts only: tap it harder")
+    moving = np.flatnonzero(np.abs(steps) > 2.5 * run.resolution)
+    if len(moving) == 0 or np.max(np.abs(away)) < 20 * run.resolution:
+        raise ValueError(f"the car moves by {np.max(np.abs(away)) / run.resolution:.0f} counts only: tap it harder")
     # before the tap it rests, or is held: the first turning point comes after it has begun to move
-    first = int(moving[0])
+    begin = first = int(moving[0])
     reach, way = 0.5 * np.max(np.abs(away[first:])), 0.0
-    begin = first
     for i in range(first, len(steps)):
         if way * steps[i] < 0 and abs(away[i]) > reach and way * away[i] > 0:
             begin = i
             break
         way = float(np.sign(steps[i])) or way
     crossings = begin + 1 + np.flatnonzero(np.sign(away[begin + 1 :]) != np.sign(away[begin:-1]))
-    end, fast, wide = begin, 0, 2
-    for i in crossings.tolist():
-        if i + wide >= len(x) or i - wide < begin:
-            continue
-        speed = abs(x[i + wide] - x[i - wide]) / (time[i + wide] - time[i - wide])
-        if speed < slowest:
-            break
-        end, fast = int(i) + 1, fast + 1
+    at = crossings[(crossings >= begin + 2) & (crossings < len(x) - 2)]
+    speeds = np.abs(x[at + 2] - x[at - 2]) / (time[at + 2] - time[at - 2])
+    fast = int(np.argmax(np.append(speeds < slowest, True)))
+    end = int(at[fast - 1]) + 1 if fast else begin
     if fast < 2 or end - begin < 20:
         raise ValueError(
             f"only {fast} half swings are faster than {slowest:g} m/s; tap harder, or give a smaller `slowest`"
@@ -153,15 +150,13 @@ def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float 
     return begin, end
 
 
-def free_decay(runs: Sequence[Run], *, resolution: float, slowest: float = SLOWEST, friction: bool = True) -> DecayFit:
+def free_decay(runs: Sequence[Run], *, slowest: float = SLOWEST, friction: bool = True) -> DecayFit:
     r"""Fit :math:`\omega_0`, c/m and F_C/m to free decays.
 
     Parameters
     ----------
     runs : sequence of Run
         Each with one tap and its decay.
-    resolution : float
-        Length of a count (m).
     slowest : float
         Speed (m/s) of the slowest half swing that is used.
     friction : bool
@@ -179,23 +174,24 @@ def free_decay(runs: Sequence[Run], *, resolution: float, slowest: float = SLOWE
     SolveError
         If the fit does not settle.
     """
-    method = _Method(resolution, slowest, friction)
+    method = _Method(slowest, friction)
     used = method.used
     parts, notes = method.parts(runs)
     if not parts:
         raise ValueError("no free decay can be used; " + "; ".join(notes))
-    agreed, first = None, method.guess(parts)
+    agreed, first = None, _guess(parts)
     if len(parts) > 1:
         parts, agreed, said = _agreeing(method, parts, first)
-        notes, first = notes + said, method.guess(parts)
+        notes, first = notes + said, _guess(parts)
     if agreed is not None:
         first[used] = agreed.mean
-    values, covariance, found = method.fit(parts, first)
-    if agreed is not None and not agreed.agree:
-        values[used], covariance[np.ix_(used, used)] = agreed.mean, agreed.covariance + agreed.scatter
+    found = method.fit(parts, first)
+    if agreed is None or agreed.agree:
+        found = method.with_doubt(found)
     else:
-        covariance += method.doubt(parts, values)
-    return DecayFit(values, covariance, tuple(parts), found, tuple(notes))
+        found.values[used] = agreed.mean
+        found.covariance[np.ix_(used, used)] = agreed.covariance + agreed.scatter
+    return found._replace(notes=tuple(notes))
 
 
 @cache
@@ -208,10 +204,24 @@ def _oscillator(friction: bool) -> System:
     )
 
 
-class _Method(NamedTuple):
-    """The fit of decays: length of a count (m), speed of the slowest half swing (m/s), and whether friction acts."""
+def _guess(parts: Sequence[Decay]) -> FloatArray:
+    """First values from turning points: half a period between them; each swing is q times the one before."""
+    periods, ratios = [], []
+    for part in parts:
+        away = part.x - (np.mean(part.x[-20:]) if len(part.x) > 40 else 0.0)
+        turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
+        if len(turned) > 1:
+            periods.append(2 * np.mean(np.diff(part.time[turned])))
+            heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
+            ratios += [h / g for g, h in pairwise(heights) if g > 0]
+    period = np.median(periods) if periods else 1.4
+    b = -4 * np.log(min(np.median(ratios), 0.99) if ratios else 0.7) / period  # swing to swing: exp(-b T/4)
+    return np.array([np.sqrt((2 * np.pi / period) ** 2 + b**2 / 4), b, 0.005, 0.0])
 
-    resolution: float
+
+class _Method(NamedTuple):
+    """The fit of decays: speed of the slowest half swing that is used (m/s), and whether friction acts."""
+
     slowest: float
     friction: bool
 
@@ -225,34 +235,19 @@ class _Method(NamedTuple):
         found, notes = [], []
         for run in runs:
             try:
-                span = swing(run.time, run.positions, resolution=self.resolution, slowest=self.slowest)
-                found.append(Decay(run, *span))
+                found.append(Decay(run, *swing(run, self.slowest)))
             except ValueError as error:
                 notes.append(f"{_named(run)}: not used: {error}")
         return found, notes
 
-    def guess(self, parts: Sequence[Decay]) -> FloatArray:
-        """From turning points: half a period between them; each swing is q times the one before."""
-        periods, ratios = [], []
-        for part in parts:
-            away = part.x - (float(np.mean(part.x[-20:])) if len(part.x) > 40 else 0.0)
-            turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
-            if len(turned) > 1:
-                periods.append(2 * np.mean(np.diff(part.time[turned])))
-                heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
-                ratios += [h / g for g, h in pairwise(heights) if g > 0]
-        period = float(np.median(periods)) if periods else 1.4
-        b = -4 * np.log(min(np.median(ratios), 0.99) if ratios else 0.7) / period  # swing to swing: exp(-b T/4)
-        return np.array([np.sqrt((2 * np.pi / period) ** 2 + b**2 / 4), b, 0.005, 0.0])
-
-    def fit(self, parts: Sequence[Decay], first: FloatArray) -> tuple[FloatArray, FloatArray, ParameterSet]:
-        """The four values, their covariance and the fit; zeros for a friction that is not fitted."""
+    def fit(self, parts: Sequence[Decay], first: FloatArray) -> DecayFit:
+        """The fit from first values; zeros for a friction that is not fitted."""
         names = [_NAMES[i] for i in self.used[:-1]]
         found = fit(
             _oscillator(self.friction).with_parameters(dict(zip(names, first[self.used].tolist(), strict=False))),
             [{"x": (part.time - part.time[0], part.x)} for part in parts],
             [*names, "x.offset"],
-            measured={"x": Sensor(resolution=self.resolution, offset=float(first[3]))},
+            measured={"x": Sensor(resolution=parts[0].run.resolution, offset=float(first[3]))},
             mode="dry_stick" if self.friction else None,
             tries=1,
             progress=False,
@@ -263,13 +258,13 @@ class _Method(NamedTuple):
         covariance[np.ix_(self.used, self.used)] = found.full_covariance.sel(parameter=names, other=names)
         if not np.isfinite(covariance).all():
             raise SolveError(f"the decays do not determine {', '.join(names)}")
-        return values, covariance, found
+        return DecayFit(values, covariance, tuple(parts), found)
 
-    def doubt(self, parts: Sequence[Decay], values: FloatArray) -> FloatArray:
-        """Covariance of the law: how far the values move when half of the speed is let in."""
-        slower = self._replace(slowest=self.slowest / 2).parts([part.run for part in parts])[0]
-        moved = self.fit(slower, values)[0] - values
-        return np.outer(moved, moved)
+    def with_doubt(self, found: DecayFit) -> DecayFit:
+        """The fit with the uncertainty of the law: how far its values move when half of the speed is let in."""
+        slower, _ = self._replace(slowest=self.slowest / 2).parts([part.run for part in found.parts])
+        moved = self.fit(slower, found.values).values - found.values
+        return found._replace(covariance=found.covariance + np.outer(moved, moved))
 
 
 def _named(run: Run) -> str:
@@ -284,40 +279,34 @@ def _agreeing(
     Each is fitted alone. One that the law does not fit (a string that slipped on the wheel, a hand that touched) leaves
     more than the others; one that it fits may still tell other values.
     """
-    used, alone, left = method.used, {}, {}
+    used, alone = method.used, dict[int, DecayFit]()
     for i, part in enumerate(parts):
-        try:
-            values, covariance, found = method.fit([part], first)
-            covariance += method.doubt([part], values)
-        except SolveError:
-            continue
-        alone[i], left[i] = (values[used], covariance[np.ix_(used, used)]), found.extra["x.noise"].value
+        with suppress(SolveError):
+            alone[i] = method.with_doubt(method.fit([part], first))
     said = []
-    typical = float(np.median(list(left.values()))) if left else 1.0
-    good = [i for i, noise in left.items() if noise <= _UNFITTING * typical]
+    typical = np.median([one.noise for one in alone.values()]) if alone else 1.0
+    good = [i for i, one in alone.items() if one.noise <= _UNFITTING * typical]
     if 2 * len(good) <= len(parts):
-        return (
-            parts,
-            None,
-            [
-                f"{len(parts) - len(good)} of {len(parts)} decays are not those of the law, and no majority is: "
-                "see whether the string slips on the wheel, and tap again"
-            ],
+        said.append(
+            f"{len(parts) - len(good)} of {len(parts)} decays are not those of the law, and no majority is: see "
+            "whether the string slips on the wheel, and tap again"
         )
+        return parts, None, said
     for i, part in enumerate(parts):
         if i not in good:
             by = (
                 "no decay fits it"
-                if i not in left
-                else f"it is {left[i] / typical:.1f} times as far from a decay as the others are (root of chi^2)"
+                if i not in alone
+                else f"it is {alone[i].noise / typical:.1f} times as far from a decay as the others are (root of chi^2)"
             )
             said.append(f"{_named(part.run)}: left out: {by}; see whether the string slipped on the wheel")
     if len(good) < 2:
         return [parts[i] for i in good], None, said
-    agreed = consistent(*zip(*(alone[i] for i in good), strict=True))
+    told = {i: (alone[i].values[used], alone[i].covariance[np.ix_(used, used)]) for i in good}
+    agreed = consistent(*zip(*told.values(), strict=True))
     for i, keep in zip(good, agreed.used, strict=True):
         if not keep:
-            off = agreed.off(*alone[i])
+            off = agreed.off(*told[i])
             k = int(np.argmax(np.abs(off)))
             said.append(
                 f"{_named(parts[i].run)}: left out: its {_NAMES[used[k]]} is {off[k]:+.1f} combined uncertainties from "

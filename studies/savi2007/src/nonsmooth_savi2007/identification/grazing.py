@@ -51,7 +51,7 @@ _ALIKE = 3.0  # counts by which the tops of contacts that are alike may differ
 _PUSHED = 0.03  # of the depth: what the law of the push leaves out (damping, drive during contact)
 
 
-def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float) -> Finding:
+def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, kappa: float) -> Finding:
     r"""The gap referred to the mean position under the drive, from frequency steps through the first contact.
 
     Parameters
@@ -61,8 +61,6 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
         the support mounted; the first four free.
     decay : DecayFit
         The free oscillator.
-    resolution : float
-        Length of a count (m).
     kappa : float
         About k_s/m (1/s^2): what a push tells.
 
@@ -78,7 +76,7 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
         If the first four runs are not free or none has contact, the crank's length or the screw changes, or a free run
         comes after contact has begun.
     """
-    if len(readings := {float(run.settings["gap"]) for run in runs if "gap" in run.settings}) > 1:
+    if len(readings := {run.gap for run in runs if run.mounted}) > 1:
         raise ValueError(
             f"the graze is sought at one gap, these runs have readings of {sorted(readings)} m at the screw: give one "
             "of them at a time"
@@ -89,23 +87,18 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
             "the graze is sought in steps of the frequency at one crank length, these runs have "
             f"{sorted(set(seen.crank.tolist()))} m: give one of them at a time"
         )
-    first, limit = _touching(seen, resolution)
+    first, limit = _touching(seen)
     if not np.all(seen.amplitude[:first] < seen.amplitude[first]):
         raise ValueError("the motion does not grow towards the first contact; the steps must go towards resonance")
     last, contact = first - 1, np.arange(len(seen)) >= first
     free = ~contact
-    a, (natural, b, f) = float(seen.crank[0]), decay.law
-
-    def model(omega: FloatArray) -> FloatArray:
-        return grazing_amplitude(omega, a, natural, b, f)
-
-    height = _height(seen, free, last, model)
+    height = _height(seen, free, decay)
     ends = seen.omega[[last, first]]
     low, high = height(ends)
     place = float(np.mean(seen.mean[free]))
-    low -= _unseen(limit, float(seen.amplitude[last]), kappa / natural**2)
-    normal = _sensor_error(seen, free, height, resolution)
-    least, most, depth = _by_push(seen, first, last, place, decay, kappa, resolution)
+    low -= _unseen(limit, seen.amplitude[last], kappa / decay.law[0] ** 2)
+    normal = _sensor_error(seen, free, height)
+    least, most, depth = _by_push(seen, first, place, decay, kappa)
     by = f"by the width of the step, {1e6 * normal:.1f} µm by the sensor"
     if depth > abs(high - low):
         by = (
@@ -117,9 +110,9 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
         low, high = max(low, least), max(high, most)
     gap, half = 0.5 * (low + high), 0.5 * abs(high - low)
     zero, zero_error = decay.rest, decay.error("x_e")
-    at_rest = float(np.hypot(np.hypot(normal, zero_error), uniform(half)))
-    total = float(np.hypot(normal, uniform(half)))
-    width = 0.5 * float(np.ptp(ends))
+    at_rest = np.hypot(np.hypot(normal, zero_error), uniform(half))
+    total = np.hypot(normal, uniform(half))
+    width = 0.5 * np.ptp(ends)
     return Finding(
         "gap_grazing",
         Estimate(gap, total, "m", half_width=half),
@@ -129,12 +122,12 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
         (
             f"contact begins between {ends.min():.3f} and {ends.max():.3f} rad/s: the gap lies within "
             f"±{1e6 * half:.1f} µm {by}",
-            f"counted from the mean position under the drive at a crank of {1e3 * a:.2f} mm, "
+            f"counted from the mean position under the drive at a crank of {1e3 * seen.crank[0]:.2f} mm, "
             f"{1e6 * (place - zero):+.0f} µm from where the car rests",
         ),
         {
             "at_rest": Estimate(gap + place - zero, at_rest, "m", half_width=half),
-            "grazing_frequency": Estimate(float(ends.mean()), uniform(width), "rad/s", half_width=width),
+            "grazing_frequency": Estimate(ends.mean(), uniform(width), "rad/s", half_width=width),
         },
         data=picture_data(
             seen.runs,
@@ -156,7 +149,7 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
     )
 
 
-def _touching(seen: Steady, resolution: float) -> tuple[int, float]:
+def _touching(seen: Steady) -> tuple[int, float]:
     """The first run that touches, and the distance of a mean from that of the free runs that tells so.
 
     All runs from the first with contact on have left it: a single mean that strays among free runs is no contact.
@@ -167,7 +160,7 @@ def _touching(seen: Steady, resolution: float) -> tuple[int, float]:
     turn = np.sign(np.diff(seen.omega))
     if not np.all(turn == turn[0]):
         raise ValueError("the frequency does not go one way from run to run: give the steps of one direction")
-    if np.std(seen.mean[:_FIRST], ddof=1) > _STEADY * resolution:
+    if np.std(seen.mean[:_FIRST], ddof=1) > _STEADY * seen.resolution:
         raise ValueError(
             f"the mean position moves among the first {_FIRST} runs: they touch already, or are not steady; begin "
             "farther away from resonance, in free motion (where contact ends is not where it begins)"
@@ -175,7 +168,7 @@ def _touching(seen: Steady, resolution: float) -> tuple[int, float]:
     begun, limit = _FIRST, 0.0
     for _ in range(len(seen.mean)):  # the scatter of the means from the free runs, the free runs from the scatter
         free = seen.mean[:begun]
-        limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * resolution)
+        limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * seen.resolution)
         near = np.flatnonzero(np.abs(seen.mean - np.mean(free)) <= limit)
         before, begun = begun, max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
         if begun == before:
@@ -192,60 +185,58 @@ def _touching(seen: Steady, resolution: float) -> tuple[int, float]:
 
 def _unseen(limit: float, amplitude: float, stiff: float) -> float:
     """Penetration of a motion whose mean moves by ``limit``; ``stiff`` is k_s/(2k)."""
-    return float((1.5 * np.pi * limit / stiff * np.sqrt(amplitude / 2)) ** (2 / 3))
+    return (1.5 * np.pi * limit / stiff * np.sqrt(amplitude / 2)) ** (2 / 3)
 
 
-def _by_push(
-    seen: Steady, first: int, last: int, place: float, decay: DecayFit, kappa: float, resolution: float
-) -> tuple[float, float, float]:
+def _by_push(seen: Steady, first: int, place: float, decay: DecayFit, kappa: float) -> tuple[float, float, float]:
     """Least and largest gap that the first run with contact allows, from the place of the free motion, and its depth.
 
     Where one contact is not like the other the push of each is not known: then the gap lies below the highest position,
     and the depth is infinite.
     """
 
-    run, (natural, _, f) = seen.runs[first], decay.law
-    period = 2 * np.pi / float(seen.omega[first])
+    run, last, (natural, _, f) = seen.runs[first], first - 1, decay.law
+    period = 2 * np.pi / seen.omega[first]
     turn = np.floor((run.time - run.time[0]) / period).astype(int)
     tops = np.array([run.positions[turn == i].max() for i in range(turn.max())]) - place
     # dry friction moves the mean of a motion that goes longer one way
-    shift = place - float(seen.mean[first]) - f / natural**2 * (seen.lean[first] - np.mean(seen.lean[: last + 1]))
-    stiff, impulse = float(np.sqrt(kappa)), natural**2 * period * max(shift, 0.0)
-    if np.ptp(tops) > _ALIKE * resolution:
-        return 0.0, float(tops.max()), float("inf")
+    shift = place - seen.mean[first] - f / natural**2 * (seen.lean[first] - np.mean(seen.lean[:first]))
+    stiff, impulse = np.sqrt(kappa), natural**2 * period * max(shift, 0.0)
+    if np.ptp(tops) > _ALIKE * seen.resolution:
+        return 0.0, tops.max(), np.inf
 
     def depth(q: float) -> float:
         def excess(p: float) -> float:
-            theta = float(np.arccos(q / (p + q)))
+            theta = np.arccos(q / (p + q))
             return 2 * stiff * ((p + q) * np.sin(theta) - q * theta) - impulse
 
-        return float(brentq(excess, 0.0, impulse / (2 * stiff) + 10 * (impulse**2 * q / stiff**2) ** (1 / 3) + 1e-9))
+        return brentq(excess, 0.0, impulse / (2 * stiff) + 10 * (impulse**2 * q / stiff**2) ** (1 / 3) + 1e-9)
 
     held = (seen.omega[last] ** 2 * seen.amplitude[last]) / kappa
     most, least = depth(held), depth(1e-6 * held)
-    own = 0.5 * resolution + _PUSHED * most  # a top lies between samples, too
-    return float(tops.mean()) - most - own, float(tops.mean()) - least + own, most
+    own = 0.5 * seen.resolution + _PUSHED * most  # a top lies between samples, too
+    return tops.mean() - most - own, tops.mean() - least + own, most
 
 
-def _height(
-    seen: Steady, free: NDArray[np.bool_], last: int, model: Callable[[FloatArray], FloatArray]
-) -> Callable[[FloatArray], FloatArray]:
+def _height(seen: Steady, free: NDArray[np.bool_], decay: DecayFit) -> Callable[[FloatArray], FloatArray]:
     """Height of the free motion above its mean, over frequency.
 
     The crank's length and the balance of friction are known to a few parts in a thousand: the model is scaled to the
     free runs that are nearest to the graze. A second harmonic, by string and ripple, hardly changes among them.
     """
+
+    def model(omega: FloatArray) -> FloatArray:
+        return grazing_amplitude(omega, seen.crank[0], *decay.law)
+
     rows = np.flatnonzero(free)
-    near = rows[np.argsort(np.abs(seen.omega[rows] - seen.omega[last]))[: max(_FIRST, len(rows) // 2)]]
-    scale = float(np.mean(seen.amplitude[near] / model(seen.omega[near])))
-    more = float(np.mean(seen.highest[near] - seen.mean[near] - seen.amplitude[near]))
+    near = rows[np.argsort(np.abs(seen.omega[rows] - seen.omega[rows[-1]]))[: max(_FIRST, len(rows) // 2)]]
+    scale = np.mean(seen.amplitude[near] / model(seen.omega[near]))
+    more = np.mean(seen.highest[near] - seen.mean[near] - seen.amplitude[near])
     return lambda omega: scale * model(np.asarray(omega)) + more
 
 
-def _sensor_error(
-    seen: Steady, free: NDArray[np.bool_], height: Callable[[FloatArray], FloatArray], resolution: float
-) -> float:
+def _sensor_error(seen: Steady, free: NDArray[np.bool_], height: Callable[[FloatArray], FloatArray]) -> float:
     """Of a height above the mean, by the scatter of the free runs about the curve, not less than rounding allows."""
     n = int(np.count_nonzero(free))
     scatter = float(np.std(seen.highest[free] - seen.mean[free] - height(seen.omega[free]), ddof=1))
-    return max(scatter, resolution / np.sqrt(12 * n)) / np.sqrt(min(n, _FIRST))
+    return max(scatter, seen.resolution / np.sqrt(12 * n)) / np.sqrt(min(n, _FIRST))

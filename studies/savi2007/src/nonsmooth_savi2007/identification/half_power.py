@@ -53,7 +53,7 @@ def half_power_points(omega: FloatArray, amplitude: FloatArray) -> tuple[float, 
         raise ValueError(
             f"{np.count_nonzero(use)} points stand above a third of the largest amplitude, 8 are needed: step finer"
         )
-    squares, middle = omega[use] ** 2, float(np.mean(omega[use] ** 2))
+    squares, middle = omega[use] ** 2, np.mean(omega[use] ** 2)
     width = np.ptp(squares) / 2
     # relative errors of the amplitudes are alike: those of 1/A^2 are 2 dA/A of it
     cubic = np.polynomial.Polynomial.fit(
@@ -69,7 +69,7 @@ def half_power_points(omega: FloatArray, amplitude: FloatArray) -> tuple[float, 
     for i in over:
         part = (2 * height[top] - height[i]) / (height[i + 1] - height[i])
         found.append(np.sqrt(middle + width * (q[i] + part * (q[i + 1] - q[i]))))
-    return float(found[0]), float(found[1]), float(height[top] ** -0.5)
+    return found[0], found[1], height[top] ** -0.5
 
 
 def _damping(omega: FloatArray, amplitude: FloatArray) -> tuple[float, ...]:
@@ -77,7 +77,7 @@ def _damping(omega: FloatArray, amplitude: FloatArray) -> tuple[float, ...]:
     first, second, largest = half_power_points(omega, amplitude)
     double = np.arctan((second**2 - first**2) / (second**2 + first**2))
     xi, natural = np.sin(double / 2), np.sqrt((first**2 + second**2) / (2 * np.cos(double)))
-    return float(xi), float(natural), first, second, largest
+    return xi, natural, first, second, largest
 
 
 def half_power(seen: Steady, mass: Quantity) -> Finding:
@@ -100,10 +100,10 @@ def half_power(seen: Steady, mass: Quantity) -> Finding:
     for longest in np.unique(seen.crank).tolist():
         part = seen.only(seen.crank == longest)
         value, error = _damping(part.omega, part.amplitude), _scatter(part)
-        product = Estimate(2 * value[0] * value[1], 2 * float(error[5]))
+        product = Estimate(2 * value[0] * value[1], 2 * error[5])
         by_crank[f"c_{1e3 * longest:.1f}mm"] = product.times(mass.value, mass.uncertainty, "N s/m")
     *others, (_, c) = by_crank.items()
-    ratio = Estimate(value[0], float(error[0]))
+    ratio = Estimate(value[0], error[0])
     notes = [
         f"half power at {value[2]:.4f} and {value[3]:.4f} rad/s, by a cubic of 1/A^2 over omega^2; uncertainty by "
         f"bootstrap over the {len(part)} runs at a crank of {1e3 * longest:.1f} mm"
@@ -119,19 +119,12 @@ def half_power(seen: Steady, mass: Quantity) -> Finding:
         tuple(notes),
         {
             "damping_ratio": ratio,
-            "omega_0": Estimate(value[1], float(error[1]), "rad/s"),
+            "omega_0": Estimate(value[1], error[1], "rad/s"),
             **dict(others),
         },
         data=picture_data(
             part.runs,
-            {
-                "run": {
-                    "omega": part.omega,
-                    "amplitude": part.amplitude,
-                    "amplitude_error": part.error,
-                    "direction": part.direction,
-                }
-            },
+            {"run": part.curve},
             omega_low=value[2],
             omega_high=value[3],
             largest=value[4],

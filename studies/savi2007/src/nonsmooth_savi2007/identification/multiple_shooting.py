@@ -73,13 +73,13 @@ class ContactFit(NamedTuple):
 
     def estimate(self, place: int, unit: str = "", logarithmic: bool = False) -> Estimate:
         """The parameter at a place."""
-        value, error = float(self.values[place]), float(np.sqrt(self.covariance[place, place]))
+        value, error = self.values[place], np.sqrt(self.covariance[place, place])
         return Estimate(value, error, unit, logarithmic=logarithmic and value > 0)
 
     @property
     def samples(self) -> int:
         """Samples that entered."""
-        return int(sum(one.residuals.sizes["sample"] for one in self.fits))
+        return sum(one.residuals.sizes["sample"] for one in self.fits)
 
     @property
     def n_contacts(self) -> int:
@@ -136,15 +136,15 @@ def _rig(wanders: bool) -> System:
 
 def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate) -> ParameterSet:
     """Priors: what the decays, the settings of a run, and ``also`` others by themselves, tell of its motion."""
-    crank, rest = float(run.settings["crank_length"]), decay.rest
-    values = (*decay.law, float(run.settings["gap"]) + rest, rest, crank, mark, 0.0, 0.0)
+    crank, rest = run.crank, decay.rest
+    values = (*decay.law, run.gap + rest, rest, crank, mark, 0.0, 0.0)
     # the gap as read to 1.5 mm; the crank as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
     covariance = np.diag([0.0, 0.0, 0.0, 1.5e-3, 1e-3, 5e-3 * crank, 0.05, 0.03 * crank, 0.03 * crank]) ** 2
     covariance[:3, :3] = decay.covariance[:3, :3] + 1e-12 * np.diag(np.diag(decay.covariance)[:3])
     rows = zip((*SHARED[:3], *OWN), values, np.sqrt(np.diag(covariance)), strict=True)
     beside = np.diag([one.uncertainty**2 for one in also.values()])
     return ParameterSet(
-        {name: Estimate(float(v), float(e)) for name, v, e in rows} | also,
+        {name: Estimate(v, e) for name, v, e in rows} | also,
         np.block([[covariance, np.zeros((9, len(also)))], [np.zeros((len(also), 9)), beside]]),
     )
 
@@ -155,7 +155,6 @@ def fit_contact(
     wanders: bool,
     known: ParameterSet,
     first: Mapping[str, float],
-    resolution: float,
     span: tuple[float, float],
     **options: Any,
 ) -> ParameterSet:
@@ -172,7 +171,7 @@ def fit_contact(
         _rig(wanders).with_parameters({**first, **set_to}),
         recorded,
         dict.fromkeys([*SHARED, *OWN]) | {"gamma": (0.0, None)},
-        measured={"x": Sensor(resolution=resolution)},
+        measured={"x": Sensor(resolution=run.resolution)},
         priors=known,
         window=_WINDOW,
         tries=1,
@@ -183,7 +182,7 @@ def fit_contact(
 
 
 def shoot_contacts(
-    runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float, gamma: float, mark: float = 0.0
+    runs: Sequence[Run], decay: DecayFit, *, kappa: float, gamma: float, mark: float = 0.0
 ) -> ContactFit:
     """Fit the runs with contact, and join what they tell.
 
@@ -191,8 +190,8 @@ def shoot_contacts(
     ----------
     runs : sequence of Run
         With ``x``, ``turns``, and the settings ``crank_length`` and ``gap`` (a first guess).
-    decay, resolution
-        What the free decay told, and the length of a count (m).
+    decay : DecayFit
+        What the free decay told.
     kappa, gamma : float
         First guess of k_s/m (1/s^2) and c_s/m (1/s).
     mark : float
@@ -213,15 +212,15 @@ def shoot_contacts(
         known, drive, span = known_before(run, decay, mark), drive_phase(run.passages), _span(run)
         wanders, first = not drive.wander()[1], {"kappa": kappa, "gamma": gamma, **known}
         try:
-            found = fit_contact(run, drive, wanders, known, first, resolution, span)
+            found = fit_contact(run, drive, wanders, known, first, span)
             if _excess(found, decay) > _FAR:
-                found = fit_contact(run, drive, wanders, known, first, resolution, span, leave_out=True)
+                found = fit_contact(run, drive, wanders, known, first, span, leave_out=True)
         except SolveError as reason:
             left.append(f"contact {run.name}: left out: {reason}")
             continue
         moved = np.zeros(len(SHARED) + len(OWN))
         if wanders:
-            moved = _values(fit_contact(run, drive.coarser, wanders, known, found, resolution, span)) - _values(found)
+            moved = _values(fit_contact(run, drive.coarser, wanders, known, found, span)) - _values(found)
         rows.append((run, found, known, moved))
     good = [row for row in rows if _excess(row[1], decay) <= _FAR]
     poor = 2 * len(good) <= len(touched)
@@ -235,15 +234,15 @@ def shoot_contacts(
         rows = good
     if not rows:
         raise SolveError("; ".join(left))
-    excess = [_excess(row[1], decay) for row in rows]
+    used, fits, *_ = zip(*rows, strict=True)
     values, covariance, moved = _joined([row[1:] for row in rows])
     return ContactFit(
         values,
         covariance + np.outer(moved, moved),
-        tuple(row[0] for row in rows),
-        tuple(row[1] for row in rows),
+        used,
+        fits,
         moved,
-        float(np.median(excess)),
+        np.median([_excess(one, decay) for one in fits]),
         tuple(left),
         poor,
     )
@@ -251,8 +250,7 @@ def shoot_contacts(
 
 def _touches(run: Run, rest: float) -> bool:
     """Return whether the car comes near enough to the support: the screw's reading may be off by a millimetre."""
-    gap = float(run.settings["gap"])
-    return run.positions.max() > rest + (gap - 1e-3 if gap < 2e-3 else 0.5 * gap)
+    return run.positions.max() > rest + (run.gap - 1e-3 if run.gap < 2e-3 else 0.5 * run.gap)
 
 
 def _span(run: Run) -> tuple[float, float]:
@@ -298,7 +296,7 @@ def _joined(rows: Sequence[tuple[ParameterSet, ParameterSet, FloatArray]]) -> tu
     return covariance @ pull * scale, covariance * np.outer(scale, scale), covariance @ shift * scale
 
 
-def contact_finding(found: ContactFit, mass: Quantity | Estimate, *, resolution: float) -> Finding:
+def contact_finding(found: ContactFit, mass: Quantity | Estimate) -> Finding:
     """Support damping (known to a factor), and beside it stiffness and the gap of each run in the sensor's count."""
     gaps = {f"gap, {run.name}": found.estimate(found.place(i, 0), "m") for i, run in enumerate(found.runs)}
     notes = [
@@ -320,12 +318,12 @@ def contact_finding(found: ContactFit, mass: Quantity | Estimate, *, resolution:
         tuple(run.name for run in found.runs),
         tuple(notes),
         {"k_s": found.estimate(3).times(mass.value, mass.uncertainty, "N/m"), **gaps},
-        data=_data(found, resolution),
+        data=_data(found),
         plot="multiple_shooting",
     )
 
 
-def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: float, kappa_error: float) -> Finding:
+def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, kappa_error: float) -> Finding:
     r"""The profile of c_s over a window with a single contact: what one contact tells on its own.
 
     Known besides is what does not come from contacts: the free oscillator, k_s/m to ``kappa_error``, and the drive as
@@ -339,34 +337,32 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
         known = known_before(
             run,
             decay,
-            float(found.values[found.place(i, 3)]),
+            found.values[found.place(i, 3)],
             kappa=Estimate(kappa, kappa_error),
             gamma=Estimate(gamma, 10 * gamma),
         )
         try:
-            one = fit_contact(
-                run, drive, not drive.wander()[1], known, known, resolution, (first, last), profile=["gamma"]
-            )
+            one = fit_contact(run, drive, not drive.wander()[1], known, known, (first, last), profile=["gamma"])
         except SolveError:
             continue
         if np.isfinite(one.uncertainty["gamma"]):
-            alone.append((float(one.uncertainty["gamma"]), run, one))
+            alone.append((one.uncertainty["gamma"], run, one))
     if not alone:
         raise ValueError("no contact can be fitted on its own")
     width, run, one = sorted(alone, key=lambda row: row[0])[len(alone) // 2]
     data = next(finding.data for finding in one.findings if finding.name == "gamma, profile")
     assert data is not None
     best, low, high = (mass * float(data[name]) for name in ("best", "low", "high"))
-    bounded = bool(0 < low and np.isfinite(high))
+    bounded = 0 < low and high < np.inf
     limits = f"95 % limits {low:.3g} to {high:.3g} N s/m" if bounded else "the profile does not bound it on both sides"
-    error = best * float(np.log(high / low)) / (2 * ndtri(0.975)) if bounded else mass * width
+    error = best * np.log(high / low) / (2 * ndtri(0.975)) if bounded else mass * width
     shown = data.assign({name: data[name] * mass for name in ("best", "low", "high")})
     shown = shown.assign_coords(value=("value", mass * data["value"].values, {"units": "N s/m"}))
     return Finding(
         "c_s_one_contact",
         Estimate(best, error, "N s/m", logarithmic=bounded),
         "profile likelihood of one contact, its gap, place and drive found with it",
-        int(one.residuals.sizes["sample"]),
+        one.residuals.sizes["sample"],
         (run.name,),
         (f"{limits}; the window is the median one of {len(alone)}",),
         data=shown.assign_attrs(parameter="c_s", units="N s/m", synthetic="yes" if run.synthetic else "no"),
@@ -374,9 +370,9 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
     )
 
 
-def _data(found: ContactFit, resolution: float) -> xr.Dataset:
+def _data(found: ContactFit) -> xr.Dataset:
     """The longest run, sample by sample."""
-    which = max(range(len(found.runs)), key=lambda i: found.fits[i].residuals.sizes["sample"])
+    which = int(np.argmax([one.residuals.sizes["sample"] for one in found.fits]))
     run, fitted_of = found.runs[which], found.fits[which].residuals
     time, x = run.time, run.positions
     fitted, segment = np.full(len(x), np.nan), np.full(len(x), -1)
@@ -389,7 +385,7 @@ def _data(found: ContactFit, resolution: float) -> xr.Dataset:
             "time": {
                 "time": time,
                 "x": x,
-                "x_error": np.full(len(x), resolution / np.sqrt(12)),
+                "x_error": np.full(len(x), run.resolution / np.sqrt(12)),
                 "fitted": fitted,
                 "residual": x - fitted,
                 "segment": segment,

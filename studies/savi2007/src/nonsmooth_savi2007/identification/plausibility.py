@@ -35,19 +35,19 @@ def check_plausible(evidence: Evidence) -> None:
         With one sentence for each thing that cannot be: runs, what was found, what is possible, what to look at.
     """
     everything = [run for rows in evidence.runs.values() for run in rows]
-    wrong = [*_constant(everything, evidence.resolution), *_clocks(everything, evidence.apparatus)]
+    wrong = [*_constant(everything), *_clocks(everything, evidence.apparatus)]
     # where a channel is constant or a clock wrong, lengths say nothing
     wrong = wrong or [*_cranks(evidence.runs), *_gaps(evidence.runs)]
     if wrong:
         raise ValueError("this session cannot be right: " + "; ".join(wrong))
 
 
-def _constant(runs: Sequence[Run], count: float) -> Iterator[str]:
-    for channel, still in (("Angle", STILL * count), ("Force", 0.0)):
+def _constant(runs: Sequence[Run]) -> Iterator[str]:
+    for channel, name, counts in (("Angle", "x", STILL), ("Force", "force", 0.0)):
         dead = []
-        for run in runs:
-            signal = run.x if channel == "Angle" else run.force
-            if channel in NEEDS[run.procedure] and np.nanmax(signal.values) - np.nanmin(signal.values) <= still:
+        for run in (run for run in runs if channel in NEEDS[run.procedure]):
+            values = getattr(run, name).values
+            if np.nanmax(values) - np.nanmin(values) <= counts * run.resolution:
                 dead.append(run.label)
         if dead:
             yield (
@@ -88,7 +88,7 @@ def _speed(run: Run) -> float:
     lag = min(lag, max(5, len(x) // 20))
     if lag < 1:
         return 0.0
-    return float(np.sqrt(np.nanmean(((x[lag:] - x[:-lag]) / (time[lag:] - time[:-lag])) ** 2)))
+    return np.sqrt(np.nanmean(((x[lag:] - x[:-lag]) / (time[lag:] - time[:-lag])) ** 2))
 
 
 def _cranks(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
@@ -96,13 +96,13 @@ def _cranks(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
         rows = runs[procedure]
         if not rows or channels != ("Angle", "Turn"):
             continue
-        ratio = np.array([0.5 * _travel(run) / _length(run, "crank_length") for run in rows])
+        ratio = np.array([0.5 * _travel(run) / _length(run) for run in rows])
         long = [run.label for run, r in zip(rows, ratio, strict=True) if r < SMALLEST]
         short = [run.label for run, r in zip(rows, ratio, strict=True) if r > LARGEST]
         if ratio.max() < SMALLEST or short:
             worst = rows[int(ratio.argmax())]
             yield (
-                f"{procedure}: cranks of {_length(worst, 'crank_length'):.4g} m and a car that swings by "
+                f"{procedure}: cranks of {_length(worst):.4g} m and a car that swings by "
                 f"{0.5e3 * _travel(worst):.3g} mm do not go together ({len(short or long)} of {len(rows)} runs, "
                 f"{few(short or long)}): is crank_length in m, and are the unit of 'Angle' and distance_per_turn right?"
             )
@@ -110,24 +110,24 @@ def _cranks(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
 
 def _gaps(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
     far = []
-    for run in (run for rows in runs.values() for run in rows if "gap" in run.settings and run.x is not None):
+    for run in (run for rows in runs.values() for run in rows if run.mounted and run.x is not None):
         reach = max(np.nanmax(np.abs(run.positions)), _travel(run))
-        if abs(float(run.settings["gap"])) > REACH * reach:
+        if abs(run.gap) > REACH * reach:
             far.append((run, reach))
     if far:
         run, reach = far[0]
         yield (
-            f"a gap of {float(run.settings['gap']):.4g} m, and a car that comes no further than {1e3 * reach:.3g} mm, "
+            f"a gap of {run.gap:.4g} m, and a car that comes no further than {1e3 * reach:.3g} mm, "
             f"in {len(far)} runs ({few([run.label for run, _ in far])}): is the gap in m?"
         )
 
 
-def not_driven(seen: Steady, count: float) -> str:
+def not_driven(seen: Steady) -> str:
     """A sentence on steady runs whose motion does not repeat with the crank; empty where all do."""
     loose = [
         run.label
         for run, size, rest in zip(seen.runs, seen.amplitude, seen.rest, strict=True)
-        if _travel(run) > 20 * count and rest > 0.5 * size
+        if _travel(run) > 20 * run.resolution and rest > 0.5 * size
     ]
     if not loose:
         return ""
@@ -143,17 +143,16 @@ def _travel(run: Run) -> float:
     return float(high - low)
 
 
-def _length(run: Run, name: str) -> float:
-    value = abs(float(run.settings[name]))
-    if not value > 0:
-        raise ValueError(f"{run.label}: {name} = {run.settings[name]!r} must be a positive length in m")
-    return value
+def _length(run: Run) -> float:
+    if not abs(run.crank) > 0:
+        raise ValueError(f"{run.label}: crank_length = {run.crank!r} must be a positive length in m")
+    return abs(run.crank)
 
 
-def slipped_late(decay: DecayFit, resolution: float) -> Iterator[str]:
+def slipped_late(decay: DecayFit) -> Iterator[str]:
     """A sentence for each tap that ends farther from rest than friction can hold a car: the string slipped later."""
-    held = decay.held + 2 * resolution
     for run in (part.run for part in decay.parts):
+        held = decay.held + 2 * run.resolution
         off = np.median(run.positions[-max(10, len(run.time) // 20) :]) - decay.rest
         if abs(off) > held:
             yield (

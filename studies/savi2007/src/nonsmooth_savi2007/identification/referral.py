@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nonsmooth.identification import Estimate, Finding, uniform
+from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted
 from nonsmooth_savi2007.identification.cross_checks import consistent
@@ -89,7 +90,7 @@ def mean_of_drive(crank_length: float, string_length: float, ripple: float = 0.0
     """
     a = crank_length
     string = a**2 / (4 * string_length) * (1 + 3 * a**2 / (16 * string_length**2))
-    return string - 0.5 * a * ripple * float(np.cos(ripple_phase))
+    return string - 0.5 * a * ripple * np.cos(ripple_phase)
 
 
 def mean_shift(
@@ -97,8 +98,7 @@ def mean_shift(
     zero: float,
     zero_error: float,
     *,
-    string_length: float | None,
-    string_error: float = 0.0,
+    string: Quantity | None = None,
     dry: float = 0.0,
 ) -> MeanShift:
     r"""Fit the mean positions of steady runs without contact, together with the place of rest.
@@ -115,13 +115,15 @@ def mean_shift(
     zero, zero_error : float
         Where the car rests in the sensor's count (m), from the free decay; without taps, where the sensor was zeroed
         and how far that may be from rest.
-    string_length, string_error : float, optional
-        Length of the string.
+    string : Quantity, optional
+        Length of the string (m).
     dry : float
         F_C/2k (m).
     """
-    size = 1 / (8 * string_length) if string_length else 0.1
-    told = max(string_error, 1e-4 * string_length) / (8 * string_length**2) if string_length else 0.0
+    string_length, size, told = None, 0.1, 0.0
+    if string is not None:
+        string_length = string.value
+        size, told = 1 / (8 * string_length), max(string.uncertainty, 1e-4 * string_length) / (8 * string_length**2)
 
     def fitted(length: float | None, alpha: float, alpha_error: float) -> MeanShift:
         """Rest, alpha and beta by least squares; alpha is known beforehand to its error, beta to a ripple of 0.03."""
@@ -141,7 +143,7 @@ def mean_shift(
         return MeanShift(rest, curved, straight, covariance, covariance[:, 0] * known[0], len(y), length)
 
     free = fitted(None, 0.0, 2 * size if string_length else 0.25)
-    error = float(np.sqrt(free.covariance[1, 1]))
+    error = np.sqrt(free.covariance[1, 1])
     if abs(free.alpha) <= _CLEAR * error:
         several = f"the {len(seen)} runs without the support do not tell"
         note = (
@@ -188,7 +190,7 @@ class CountedGap(NamedTuple):
 
 def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     """Weighted mean of the gaps of the runs at a reading of the screw, without those that disagree; None of none."""
-    rows = [i for i, run in enumerate(contacts.runs) if float(run.settings["gap"]) == reading]
+    rows = [i for i, run in enumerate(contacts.runs) if run.gap == reading]
     if not rows:
         return None
     index = [contacts.place(i, 0) for i in rows]
@@ -204,19 +206,19 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
     block = contacts.covariance[np.ix_(index, index)]
     solved = np.linalg.solve(block, np.ones(len(index)))
-    weight = np.asarray(solved / solved.sum(), float)
-    counted = float(weight @ contacts.values[index])
+    weight = solved / solved.sum()
+    counted = weight @ contacts.values[index]
     off = contacts.values[index] - counted
-    chi2 = float(off @ np.linalg.solve(block, off))
+    chi2 = off @ np.linalg.solve(block, off)
     # the runs may differ by more than they say: then their scatter counts
     square = max(chi2 / max(len(index) - 1, 1), 1.0) * (weight @ block @ weight)
     if not apart.agree:
-        square += float(apart.scatter[0, 0])
+        square += apart.scatter[0, 0]
         notes.append(
             f"the gaps of the {len(index)} runs with contact disagree (Birge ratio {apart.birge:.1f}) and no majority "
             "agrees: the scatter between them is the uncertainty; see whether the string slips on the wheel"
         )
-    return CountedGap(counted, float(np.sqrt(square)), index, weight, tuple(notes))
+    return CountedGap(counted, np.sqrt(square), index, weight, tuple(notes))
 
 
 class Referred(NamedTuple):
@@ -285,16 +287,8 @@ def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: fl
         zero, error, dry = decay.rest, decay.error("x_e"), decay.held
     else:
         zero, dry = 0.0, held or 0.0
-        error = float(np.hypot(uniform(_HELD if held is None else held), uniform(evidence.resolution / 2)))
-    length = evidence.apparatus.get("string_length")
-    found = mean_shift(
-        seen,
-        zero,
-        error,
-        string_length=length.value if length else None,
-        string_error=length.uncertainty if length else 0.0,
-        dry=dry,
-    )
+        error = np.hypot(uniform(_HELD if held is None else held), uniform(evidence.resolution / 2))
+    found = mean_shift(seen, zero, error, string=evidence.apparatus.get("string_length"), dry=dry)
     if decay is None or abs(found.rest) < evidence.resolution:
         return found
     said = (
@@ -338,12 +332,12 @@ def refer(
     crank_length : float, optional
         The longest of the runs with contact where not given.
     """
-    readings = [float(run.settings["gap"]) for run in contacts.runs]
+    readings = [run.gap for run in contacts.runs]
     reading = max(set(readings), key=readings.count)
     counted = counted_gap(contacts, reading)
     assert counted is not None
     found = places(evidence, decay, seen)
-    longest = max(float(run.settings["crank_length"]) for run in contacts.runs)
+    longest = max(run.crank for run in contacts.runs)
     crank = longest if crank_length is None else crank_length
     moved = found.row(crank)
     # gap = counted - rest - shift, at rest = counted - rest, of counted and (rest, alpha, beta)
@@ -355,7 +349,7 @@ def refer(
     values = rows @ [counted.value, found.rest, found.alpha, found.beta]
     names = ("g", "gap_at_rest", "mean_shift", "rest_position")
     estimates = {
-        name: Estimate(float(value), float(np.sqrt(square)), "m")
+        name: Estimate(value, np.sqrt(square), "m")
         for name, value, square in zip(names, values, np.diag(covariance), strict=True)
     }
     with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.places] @ counted.weight)

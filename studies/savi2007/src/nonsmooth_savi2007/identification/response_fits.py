@@ -100,12 +100,7 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
     data = picture_data(
         some.runs,
         {
-            "run": {
-                "omega": some.omega,
-                "amplitude": some.amplitude,
-                "amplitude_error": some.error,
-                "direction": some.direction,
-            },
+            "run": some.curve,
             "omega_fine": {"omega_fine": fine, "joint_amplitude": joint, "viscous_amplitude": plain},
         },
         c_joint=c_both,
@@ -242,7 +237,7 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> Finding:
     values, covariance = factor * values, covariance * np.outer(factor, factor) + np.outer(by_mass, by_mass)
     errors = np.sqrt(np.diag(covariance))
     units = ("N s/m", "rad/s", "N", "", "rad")
-    rows = [Estimate(float(v), float(e), unit) for v, e, unit in zip(values, errors, units, strict=True)]
+    rows = [Estimate(*row) for row in zip(values, errors, units, strict=True)]
     return Finding(
         "c_frequency_response",
         rows[0],
@@ -329,7 +324,7 @@ def crank_mark(seen: Steady, decay: DecayFit) -> float:
     Angles count from where the crank pulls the car towards the support. A motor on the other side has the same mark at
     half a turn.
     """
-    return float(np.angle(np.sum(seen.response * np.conj(receptance(seen.omega, seen.crank, *decay.law)))))
+    return np.angle(np.sum(seen.response * np.conj(receptance(seen.omega, seen.crank, *decay.law))))
 
 
 def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> xr.Dataset:

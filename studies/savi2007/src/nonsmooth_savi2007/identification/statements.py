@@ -84,7 +84,7 @@ def identifiability(adjusted: Adjusted, contacts: ContactFit | None, single: Fin
         "g": "from where contacts begin, referred to the mean position under the drive",
     }
     if contacts is not None:
-        relative = float(np.sqrt(contacts.covariance[4, 4]) / abs(contacts.values[4]))
+        relative = np.sqrt(contacts.covariance[4, 4]) / abs(contacts.values[4])
         said["c_s"] += (
             f"; {contacts.n_contacts} contacts together know it within a factor {np.exp(1.96 * relative):.4g}"
         )
@@ -168,9 +168,9 @@ def joined(
     matrix[:size, :size] = adjusted.covariance
     told = {name: (adjusted.estimate(name), unit[i]) for i, name in enumerate(names)}
     if {"m", "k"} <= told.keys():
-        omega = float(np.sqrt(2 * adjusted["k"] / adjusted["m"]))
+        omega = np.sqrt(2 * adjusted["k"] / adjusted["m"])
         row = omega / 2 * (unit[names.index("k")] / adjusted["k"] - unit[names.index("m")] / adjusted["m"])
-        told["omega_0"] = Estimate(omega, float(np.sqrt(row @ matrix @ row)), "rad/s"), row
+        told["omega_0"] = Estimate(omega, np.sqrt(row @ matrix @ row), "rad/s"), row
     if gap is not None:
         matrix[size:, :size], matrix[:size, size:], matrix[size:, size:] = gap.cross, gap.cross.T, gap.covariance
         told |= {name: (one, row) for (name, one), row in zip(gap.estimates.items(), unit[size:], strict=True)}

@@ -23,7 +23,7 @@ class Steady:
 
     Attributes
     ----------
-    omega, omega_error : array (n,)
+    omega : array (n,)
         The drive's frequency (rad/s), from the photogate.
     crank : array (n,)
         Length of the crank (m).
@@ -44,7 +44,6 @@ class Steady:
 
     runs: tuple[Run, ...]
     omega: FloatArray
-    omega_error: FloatArray
     crank: FloatArray
     amplitude: FloatArray
     error: FloatArray
@@ -64,9 +63,24 @@ class Steady:
         return [str(run.settings.get("direction", "up")) for run in self.runs]
 
     @property
+    def curve(self) -> dict[str, Any]:
+        """Amplitudes over frequency, as pictures show them."""
+        return {
+            "omega": self.omega,
+            "amplitude": self.amplitude,
+            "amplitude_error": self.error,
+            "direction": self.direction,
+        }
+
+    @property
     def samples(self) -> int:
         """Samples of all runs."""
-        return int(sum(len(run.time) for run in self.runs))
+        return sum(len(run.time) for run in self.runs)
+
+    @property
+    def resolution(self) -> float:
+        """Length of a count (m)."""
+        return self.runs[0].resolution
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -79,8 +93,9 @@ class Steady:
         return Steady(tuple(self.runs[i] for i in rows), *(getattr(self, one.name)[rows] for one in fields(self)[1:]))
 
 
-def harmonics_of(run: Run, time: FloatArray, values: Any) -> tuple[HarmonicFit, float, float, float]:
-    """Harmonics of a signal of a run over whole turns; the drive's frequency, its error, and the time of phase 0."""
+def harmonics_of(run: Run, values: Any) -> tuple[HarmonicFit, float, float]:
+    """Harmonics of a channel of a run over whole turns; the drive's frequency, and the time of phase 0."""
+    time = np.asarray(values["time"].values, float)
     drive = drive_phase(run.passages)
     whole = int(np.floor((time[-1] - time[0]) / drive.period))
     if whole < 2:
@@ -90,7 +105,7 @@ def harmonics_of(run: Run, time: FloatArray, values: Any) -> tuple[HarmonicFit, 
     inside = time <= time[0] + whole * drive.period
     fitted = harmonic_fit(time[inside], values[inside], drive.omega, HARMONICS)
     # the gate's times to 0.1 ms each: all of them together tell the phase
-    return fitted, drive.omega, drive.omega_error, float(np.mean(drive.turn_times - drive.period * drive.turns))
+    return fitted, drive.omega, float(np.mean(drive.turn_times - drive.period * drive.turns))
 
 
 def steady(runs: Sequence[Run]) -> Steady:
@@ -102,36 +117,32 @@ def steady(runs: Sequence[Run]) -> Steady:
         If a run lasts for less than two turns, or has no photogate.
     """
     rows: list[tuple[Any, ...]] = []
-    order, turn = np.arange(1, HARMONICS + 1), np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    order, turn = np.arange(1, HARMONICS + 1), np.linspace(0, 2 * np.pi, 721)
     for run in runs:
-        fitted, omega, omega_error, mark = harmonics_of(run, run.time, run.x)
-        amplitude, shape = float(fitted.amplitudes[0]), np.multiply.outer(turn, order) - fitted.phases
+        fitted, omega, mark = harmonics_of(run, run.x)
+        amplitude, shape = fitted.amplitudes[0], np.multiply.outer(turn, order) - fitted.phases
         rows.append(
             (
                 omega,
-                omega_error,
-                float(run.settings["crank_length"]),
+                run.crank,
                 amplitude,
-                float(fitted.amplitude_errors[0]),
-                amplitude * np.exp(1j * (omega * mark - float(fitted.phases[0]))),
+                fitted.amplitude_errors[0],
+                amplitude * np.exp(1j * (omega * mark - fitted.phases[0])),
                 fitted.mean,
                 fitted.mean_error,
                 fitted.mean + (np.cos(shape) @ fitted.amplitudes).max(),
                 fitted.residual,
-                _lean(fitted),
+                _lean(-np.sin(shape) @ (order * fitted.amplitudes)),
             )
         )
     columns = [np.array(column) for column in zip(*rows, strict=True)] or [np.zeros(0)] * (len(fields(Steady)) - 1)
     return Steady(tuple(runs), *columns)
 
 
-def _lean(fitted: HarmonicFit) -> float:
-    """Mean sign of the velocity over a turn, its zeros by interpolation."""
-    turn = np.linspace(0, 2 * np.pi, 721)
-    order = np.arange(1, HARMONICS + 1)
-    v = -np.sin(np.multiply.outer(turn, order) - fitted.phases) @ (order * fitted.amplitudes)
+def _lean(v: FloatArray) -> float:
+    """Mean sign of a velocity over a turn, its zeros by interpolation."""
     before, after = v[:-1], v[1:]
     # the share of each step in which v is positive
     step = np.where(before == after, 1.0, np.abs(after - before))
     part = np.where(before * after < 0, np.maximum(before, after) / step, (before + after > 0).astype(float))
-    return float(2 * np.mean(part) - 1)
+    return 2 * float(np.mean(part)) - 1

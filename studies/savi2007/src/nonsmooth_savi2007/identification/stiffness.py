@@ -34,7 +34,6 @@ _WINDOW, _ORDER = 21, 4  # samples: follows a hand's tremor, 3 Hz, to 1 %
 def stiffness(
     runs: Sequence[Run],
     *,
-    resolution: float,
     mass: float = 0.0,
     gain_limit: float = 0.01,
     friction: bool = True,
@@ -45,9 +44,8 @@ def stiffness(
     Parameters
     ----------
     runs : sequence of Run
-        Each with ``x`` and ``force`` over the same times.
-    resolution : float
-        Length of a count (m); its variance is that of :math:`\delta^2 / 12`, projected by the slope.
+        Each with ``x`` and ``force`` over the same times. The variance of a count's length :math:`\delta`,
+        :math:`\delta^2 / 12`, is projected by the slope.
     mass : float
         Mass that the hand accelerates (kg); 0 for a massless spring.
     gain_limit : float
@@ -68,7 +66,7 @@ def stiffness(
     ValueError
         If a run's force and displacement are not over the same times, or the pull is too short to tell a slope.
     """
-    rows = [_columns(run, resolution, mass, friction) for run in runs]
+    rows, resolution = [_columns(run, mass, friction) for run in runs], runs[0].resolution
     lengths = [len(force) for _, force in rows]
     terms, force = np.concatenate([part for part, _ in rows]), np.concatenate([force for _, force in rows])
     if np.ptp(terms[:, 0]) < 50 * resolution:
@@ -77,16 +75,14 @@ def stiffness(
     values, covariance, left = _linear_law(columns, force, np.ones(len(force)), lengths)
     for _ in range(3):
         # the force's own variance is what its residuals leave after the count's, projected by the slope
-        projected = float(values[0]) ** 2 * resolution**2 / 12
+        projected = values[0] ** 2 * resolution**2 / 12
         noise = max(np.var(left) - projected, 0.1 * np.var(left))
         values, covariance, left = _linear_law(columns, force, np.full(len(force), noise + projected), lengths)
-    slope, error = float(values[0]), float(np.sqrt(covariance[0, 0]))
+    errors = np.sqrt(np.diag(covariance))
+    slope, error = values[0], errors[0]
     half = gain_limit * slope
-    others = {
-        key: Estimate(float(values[i]), float(np.sqrt(covariance[i, i])), unit)
-        for i, (key, unit) in enumerate((("slope_a", "N/m"), ("damping", "N s/m"), ("friction_force", "N")))
-        if i < terms.shape[1]
-    }
+    names = (("slope_a", "N/m"), ("damping", "N s/m"), ("friction_force", "N"))[: terms.shape[1]]
+    others = {key: Estimate(v, e, unit) for (key, unit), v, e in zip(names, values, errors, strict=False)}
     notes = [
         f"type A {error:.2g} N/m; type B {uniform(half):.2g} N/m, the sensor's gain within ±{100 * gain_limit:g} %, "
         "common to all forces of this sensor",
@@ -94,7 +90,7 @@ def stiffness(
     if mass:
         notes.append(f"the inertia of {mass:.4g} kg under the hand is put back")
     number, ways = np.arange(len(runs)), (1.0, -1.0) if friction else (0.0,)
-    loop = float(values[2]) if friction else 0.0
+    loop = values[2] if friction else 0.0
     data = picture_data(
         runs,
         {
@@ -116,7 +112,7 @@ def stiffness(
     )
     return Finding(
         name,
-        Estimate(slope, float(np.hypot(error, uniform(half))), "N/m", half_width=half),
+        Estimate(slope, np.hypot(error, uniform(half)), "N/m", half_width=half),
         "force against displacement, errors in both axes by effective variance, loop and inertia as terms (Fig. 4)",
         len(force),
         tuple(run.name for run in runs),
@@ -140,13 +136,13 @@ def _linear_law(
     return np.asarray(values), correlated(columns * weight[:, None], residuals * weight, pieces), residuals
 
 
-def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
+def _columns(run: Run, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
     time, force_time = run.time, np.asarray(run.force["time"].values, float)
     if len(time) != len(force_time) or np.max(np.abs(time - force_time)) > 1e-6:
         raise ValueError(
             f"{run.label}: channels 'Angle' and 'Force' are not over the same times; record both at one rate"
         )
-    smooth = savitzky_golay(time, run.x, resolution=resolution, window=_WINDOW, order=_ORDER)
+    smooth = savitzky_golay(time, run.x, resolution=run.resolution, window=_WINDOW, order=_ORDER)
     v, a = smooth["v"].values, smooth["a"].values
     force = np.asarray(run.force.values, float) - mass * a
     parts = [run.positions, v]

@@ -95,7 +95,7 @@ def _blocks(
         title += " (virtual rig, synthetic)" if figure.rig else ""
         caption = figure.caption(data[figure.name])
         blocks += [heading(title, 3), image(folder / f"{figure.name}.png", f"{figure.name}.pdf", caption)]
-    blocks += [heading("The computation"), paragraph(_about_the_model())]
+    blocks += [heading("The computation"), paragraph(_ABOUT_THE_MODEL)]
     if any(figure.rig for figure in figures):
         blocks.append(paragraph(_ABOUT_THE_RIG))
     blocks += [heading("What the paper leaves open"), bullets(_OPEN)]
@@ -255,15 +255,6 @@ def _parameters(data: Data) -> Written:
     return table(header, rows)
 
 
-def _about_the_model() -> str:
-    return (
-        "Every statement is measured on the paper's own model with the parameters of its Table 1: by the exact flow, "
-        f"and by the paper's smoothed switch with eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = "
-        f"{SMOOTHED.options['rtol']:g}. Written by nonsmooth {__version__}; all numbers are read off the "
-        "datasets beside this file."
-    )
-
-
 def _about_points(points: Sequence[SpecialPoint]) -> str:
     text = (
         "Every flip, fold and grazing point of the periodic orbits of Figs. 9, 10, 11, 13 and 17 (exact flow), along "
@@ -280,6 +271,12 @@ def _about_points(points: Sequence[SpecialPoint]) -> str:
     return text
 
 
+_ABOUT_THE_MODEL = (
+    "Every statement is measured on the paper's own model with the parameters of its Table 1: by the exact flow, and "
+    f"by the paper's smoothed switch with eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = "
+    f"{SMOOTHED.options['rtol']:g}. Written by nonsmooth {__version__}; all numbers are read off the datasets beside "
+    "this file."
+)
 _ABOUT_THE_RIG = (
     "What the paper measured is measured here on a virtual rig (synthetic): a computed apparatus with the paper's "
     "Table 1 and more physics than the model (strings, an uneven motor, dry friction, a support that takes time to "

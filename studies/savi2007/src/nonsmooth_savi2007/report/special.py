@@ -13,7 +13,6 @@ from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches_of, rows_of
 from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.report.pages import Written, table
 
-_NAMES = {"fold": "fold", "flip": "flip", "grazing": "grazing", "neimark_sacker": "Neimark-Sacker"}
 _UNITS = {"omega": ("rad/s", 8), "rho": ("N", 8), "g": ("m", 11)}  # decimals: eight digits at least
 
 
@@ -98,7 +97,7 @@ def special_table(points: Sequence[SpecialPoint]) -> Written:
             (
                 f"Fig. {int(one.figure[3:])}" if one.figure != last[0] else "",
                 str(one.period) if here != last else "",
-                _NAMES.get(one.kind, one.kind),
+                "Neimark-Sacker" if one.kind == "neimark_sacker" else one.kind,
                 f"{one.parameter} = {one.value:.{decimals}f} {unit}",
                 _number(one.multiplier),
                 "" if one.contact is None else _number(one.contact),

@@ -7,6 +7,7 @@ which the car first touches from listening.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ import xarray as xr
 from nonsmooth import Recording, SolveError
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.motor import frequency, mean_position, passages, voltage_for
-from nonsmooth_savi2007.rig.physics import NO_SUPPORT, Wander, simulated
+from nonsmooth_savi2007.rig.physics import NO_SUPPORT, simulated
 from nonsmooth_savi2007.rig.truth import NOMINAL_GAP
 
 if TYPE_CHECKING:
@@ -32,13 +33,13 @@ class SteadyRun(NamedTuple):
     crank_length: float
     gap: float | None = None
     duration: float = 15.0
-    notes: tuple[tuple[str, Any], ...] = ()
+    notes: Mapping[str, Any] = MappingProxyType({})
     release: float | None = None
 
     def stated(self) -> dict[str, Any]:
         """The settings as they go into the notebook."""
         gap = {} if self.gap is None else {"gap": self.gap}
-        return {"crank_length": self.crank_length, "voltage": self.voltage, **gap, **dict(self.notes)}
+        return {"crank_length": self.crank_length, "voltage": self.voltage, **gap, **self.notes}
 
 
 def records(
@@ -47,51 +48,29 @@ def records(
     """One run per setting, steady after ``settle`` seconds; with ``carry`` each begins where the one before ended."""
     runs = []
     last: xr.Dataset | None = None
-    for i, setting in enumerate(settings):
+    omegas = [frequency(rig, setting.voltage) for setting in settings]  # what cannot be is refused before any run
+    for i, (setting, omega) in enumerate(zip(settings, omegas, strict=True)):
         rng, name = rig.generator(procedure, i), f"Run #{i + 1}"
-        wander = rig.wander(procedure, i, frequency(rig, setting.voltage))
-        channels, ended = _steady(rig, rng, name, setting, settle, last, wander)
+        wander, period = rig.wander(procedure, i, omega), 2 * np.pi / omega
+        gap = NO_SUPPORT if setting.gap is None else rig.true_gap(setting.gap)
+        set_to = rig.parameters(omega=omega, crank_length=setting.crank_length, g=gap) | wander
+        before, phase = int(np.ceil(settle / period)), float(rng.uniform())
+        # Whole periods in all, so that the next run can begin where this one ends.
+        recorded = int(np.ceil(phase + (setting.duration + 1 / sensors.RATE) / period))
+        time, at = sensors.instants(rig, rng, setting.duration)
+        begin = (before + phase) * period
+        (x, v), ended = simulated(
+            rig.system().with_parameters(set_to),
+            name,
+            instants=begin + at,
+            turns=(before, recorded),
+            start=at_rest(gap, setting.release or 0.0) if last is None else last,
+            side=rig.truth["motor_side"],
+        )
         last = ended if carry else None
-        runs.append((name, channels, setting.stated()))
+        crossed = passages(rig, omega, begin, begin + setting.duration, **wander) - begin
+        runs.append((name, rig.channels(rng, name, time, x, v, crossed=crossed), setting.stated()))
     return rig.recording(procedure, runs)
-
-
-def _steady(
-    rig: VirtualRig,
-    rng: np.random.Generator,
-    name: str,
-    setting: SteadyRun,
-    settle: float,
-    last: xr.Dataset | None,
-    wander: Wander,
-) -> tuple[Mapping[str, Any], xr.Dataset]:
-    omega = frequency(rig, setting.voltage)
-    gap = NO_SUPPORT if setting.gap is None else rig.true_gap(setting.gap)
-    set_to = rig.parameters(omega=omega, crank_length=setting.crank_length, g=gap) | named(wander)
-    system = rig.system().with_parameters(set_to)
-    period = 2 * np.pi / omega
-    before, phase = int(np.ceil(settle / period)), float(rng.uniform())
-    # Whole periods in all, so that the next run can begin where this one ends.
-    recorded = int(np.ceil(phase + (setting.duration + 1 / sensors.RATE) / period))
-    time, at = sensors.instants(rig, rng, setting.duration)
-    begin = (before + phase) * period
-    start = at_rest(gap, setting.release or 0.0) if last is None else last
-    (x, v), result = simulated(
-        system,
-        name,
-        instants=begin + at,
-        turns=(before, recorded),
-        start=start,
-        side=rig.truth["motor_side"],
-    )
-    crossed = passages(rig, omega, begin, begin + setting.duration, wander) - begin
-    return rig.channels(rng, name, time, x, v, crossed=crossed), result
-
-
-def named(wander: Wander) -> dict[str, float]:
-    """The slow terms of the motor's angle as parameters of the system."""
-    words = ("wander", "wander_rate", "wander_phase")
-    return {f"{word}_{j}": term[i] for j, term in enumerate(wander, 1) for i, word in enumerate(words)}
 
 
 def at_rest(gap: float, place: float = 0.0) -> dict[str, float]:
@@ -152,7 +131,7 @@ def response(
     natural = float(np.sqrt(2 * rig.truth["k"] / rig.truth["m"]))
     steps = [voltage_for(rig, natural * r) for r in RELATIVE] if voltages is None else list(voltages)
     settings = [
-        SteadyRun(voltage, float(length), gap, duration, (("direction", direction),))
+        SteadyRun(voltage, float(length), gap, duration, {"direction": direction})
         for length in crank_lengths
         for direction, row in (("up", steps), ("down", steps[::-1]))
         for voltage in row
@@ -174,7 +153,7 @@ def grazing(
     centre = graze_frequency(rig, crank_length, gap) + float(rng.uniform(-2, 2)) * step
     omegas = np.arange(centre + half_width, centre - half_width, -step)
     voltages = list(dict.fromkeys(voltage_for(rig, float(omega)) for omega in omegas))
-    settings = [SteadyRun(voltage, crank_length, gap, duration, (("direction", "down"),)) for voltage in voltages]
+    settings = [SteadyRun(voltage, crank_length, gap, duration, {"direction": "down"}) for voltage in voltages]
     return records(rig, "grazing", settings, carry=True)
 
 
@@ -204,6 +183,4 @@ def contact(
 ) -> Recording:
     """Records with contact at (frequency in rad/s, crank length in m), each begun at rest."""
     settings = [SteadyRun(voltage_for(rig, omega), length, gap, duration) for omega, length in regimes]
-    for setting in settings:
-        frequency(rig, setting.voltage)
     return records(rig, "contact", settings)

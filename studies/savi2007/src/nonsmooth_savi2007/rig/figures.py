@@ -1,8 +1,8 @@
 """The measurements behind the paper's figures: the settings that it prints, set on the rig.
 
 The paper gives the forcing as a force rho; here it is a crank length rho / k. A gap is set so that it is the paper's
-as seen from the car's mean position under the drive, which string and motor move: the screw reads that much more
-(``referred=False`` sets it at rest). Source: Savi et al. (2007), Figs. 4-18.
+as seen from the car's mean position under the drive, which string and motor move: the screw reads that much more.
+Source: Savi et al. (2007), Figs. 4-18.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from nonsmooth import Recording
 from nonsmooth_savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_18
 from nonsmooth_savi2007.rig import sensors
-from nonsmooth_savi2007.rig.driven import SteadyRun, at_rest, named, records
+from nonsmooth_savi2007.rig.driven import SteadyRun, at_rest, records
 from nonsmooth_savi2007.rig.motor import frequency, mean_position, passages, voltage_for
 from nonsmooth_savi2007.rig.physics import simulated
 
@@ -37,7 +37,7 @@ _RISE = (3.69, 0.2, 0.5, -0.0045)  # rad/s, N, N, m
 _SETTLE = 30.0  # s, before a rise begins
 _RESPONSES = {9: (0.14, 0.02), 10: (0.16, 0.0145)}
 _STEPS = {9: (3.0, 6.6), 10: (2.4, 7.4)}  # rad/s
-#: What each figure needs. Those with the support mounted also need a few runs without it, in ``response``, and taps:
+#: What each figure shows. Those with the support mounted also need a few runs without it, in ``response``, and taps:
 #: where the car swings about, from which the gap is counted, and where it rests, from which the screw counts.
 FIGURES: dict[int, tuple[str, ...]] = {
     4: ("springs", "support"),
@@ -45,10 +45,9 @@ FIGURES: dict[int, tuple[str, ...]] = {
     6: ("response",),
     7: ("drop",),
     8: ("voltage", "crank"),
-    9: ("response", "impulse"),
-    10: ("response", "impulse"),
-    11: ("rise", "response", "impulse"),
-    **dict.fromkeys(SECTIONS, ("section", "response", "impulse")),
+    **dict.fromkeys(_RESPONSES, ("response",)),
+    11: ("rise",),
+    **dict.fromkeys(SECTIONS, ("section",)),
 }
 #: Velocities (m/s) of the taps that show where the car rests.
 TAPS = (0.3, -0.3, 0.2)
@@ -59,10 +58,9 @@ def crank_for(rig: VirtualRig, rho: float) -> float:
     return round(rho / rig.truth["k"], 5)
 
 
-def screw_for(rig: VirtualRig, gap: float, crank_length: float, *, referred: bool = True) -> float:
+def screw_for(rig: VirtualRig, gap: float, crank_length: float) -> float:
     """The reading of the support's screw (m) at which the gap, from the car's mean position, is ``gap``."""
-    shift = mean_position(rig, crank_length) if referred else 0.0
-    return round(gap + shift - rig.true_gap(0.0), 7)
+    return round(gap + mean_position(rig, crank_length) - rig.true_gap(0.0), 7)
 
 
 def section(
@@ -70,7 +68,6 @@ def section(
     *,
     figure: int = 14,
     periods: int | None = None,
-    referred: bool = True,
     releases: Sequence[float] | None = None,
     settle: float = 60.0,
 ) -> Recording:
@@ -85,12 +82,11 @@ def section(
     n = _PERIODS.get(figure, 200) if periods is None else periods
     settings = []
     for place in (None, *(RELEASES.get(figure, ()) if releases is None else releases)):
+        let_go = "" if place is None else f"; the car let go at {1e3 * place:g} mm"
         for omega, rho, gap in SECTIONS[figure]:
             length = crank_for(rig, rho)
-            reading = screw_for(rig, gap, length, referred=referred)
-            remark = f"rho {rho} N, gap {gap} m, omega {omega} rad/s"
-            remark += "" if place is None else f"; the car let go at {1e3 * place:g} mm"
-            notes = (("figure", figure), ("note", remark))
+            reading = screw_for(rig, gap, length)
+            notes = {"figure": figure, "note": f"rho {rho} N, gap {gap} m, omega {omega} rad/s{let_go}"}
             duration = n * 2 * np.pi / omega
             settings.append(SteadyRun(voltage_for(rig, omega), length, reading, duration, notes, place))
     return records(rig, "section", settings, settle=settle, carry=figure == 17)
@@ -113,14 +109,14 @@ def rise(
     rng, name, true = rig.generator("rise", 0), "Run #1", rig.true_gap(screw)
     omega, rate = frequency(rig, knob), (last - first) / duration
     wander, period, side = rig.wander("rise", 0, omega), 2 * np.pi / omega, rig.truth["motor_side"]
-    set_to = rig.parameters(rising=True, omega=omega, g=true) | named(wander)
+    set_to = rig.parameters(rising=True, omega=omega, g=true) | wander
     system, start = rig.system(rising=True).with_parameters(set_to), {**at_rest(true), "a": first}
     turns = 0, int(np.ceil(_SETTLE / period))
     _, settled = simulated(system, name, instants=np.array([0.0]), turns=turns, start=start, side=side)
     time, at = sensors.instants(rig, rng, duration)
     rising, length = system.with_parameters(crank_rate=rate), duration + 1 / sensors.RATE
     (x, v), _ = simulated(rising, name, instants=at, duration=length, start=settled, side=side)
-    channels = rig.channels(rng, name, time, x, v, crossed=passages(rig, omega, 0.0, duration, wander))
+    channels = rig.channels(rng, name, time, x, v, crossed=passages(rig, omega, 0.0, duration, **wander))
     stated = {
         "crank_length": first,
         "crank_length_end": last,
@@ -141,7 +137,7 @@ def without_support(rig: VirtualRig, number: int) -> list[SteadyRun]:
         pairs = {(omega, crank_for(rig, rho)) for rho in (low, 0.5 * (low + high), high)}
     else:
         pairs = {(SECTIONS[number][0][0], crank_for(rig, rho)) for _, rho, _ in SECTIONS[number]}
-    notes = (("figure", number), ("note", "no support: the place about which the car swings"))
+    notes = {"figure": number, "note": "no support: the place about which the car swings"}
     return [SteadyRun(voltage_for(rig, omega), length, None, 30.0, notes) for omega, length in sorted(pairs)]
 
 
@@ -155,24 +151,22 @@ def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]
     """
     if number not in FIGURES:
         raise ValueError(f"figure {number!r}: measurements stand behind Figs. {', '.join(map(str, sorted(FIGURES)))}")
-    if number in SECTIONS or number == 11:
-        options = {"figure": number, **options} if number in SECTIONS else options
-        shown = FIGURES[number][0]
-        free = records(rig, "response", without_support(rig, number))
-        return {shown: rig.record(shown, **options), "response": free, "impulse": rig.impulse(velocities=TAPS)}
+    own: dict[str, Any] = {"figure": number} if number in SECTIONS else {}
     if number == 6:
-        options = {"crank_lengths": (crank_for(rig, 0.14),), **options}
-    if number in _RESPONSES:
+        own = {"crank_lengths": (crank_for(rig, 0.14),)}
+    elif number in _RESPONSES:
         rho, gap = _RESPONSES[number]
         length = crank_for(rig, rho)
-        steps = np.arange(*_STEPS[number], 0.05).tolist()
-        options = {
+        own = {
             "crank_lengths": (length,),
             "gap": screw_for(rig, gap, length),
             "duration": 20.0,
-            "voltages": [voltage_for(rig, omega) for omega in steps],
+            "voltages": [voltage_for(rig, omega) for omega in np.arange(*_STEPS[number], 0.05).tolist()],
             "after": without_support(rig, number),
-            **options,
         }
-        return {"response": rig.record("response", **options), "impulse": rig.impulse(velocities=TAPS)}
-    return {procedure: rig.record(procedure, **options) for procedure in FIGURES[number]}
+    made = {procedure: rig.record(procedure, **{**own, **options}) for procedure in FIGURES[number]}
+    if number > 8:  # the support is mounted
+        if number not in _RESPONSES:
+            made["response"] = records(rig, "response", without_support(rig, number))
+        made["impulse"] = rig.impulse(velocities=TAPS)
+    return made

@@ -60,8 +60,7 @@ def _by_hand(
     runs: list[Run] = []
     for i, reach in enumerate(reaches):
         rng, name = rig.generator(procedure, i), f"Run #{i + 1}"
-        duration = float(rng.uniform(*lasting))
-        far = reach * float(rng.uniform(least, 1.0))
+        duration, far = rng.uniform(*lasting), reach * rng.uniform(least, 1.0)
         time, at = sensors.instants(rig, rng, duration)
         x, v, acceleration = _hand(rng, at, far, duration)
         runs.append((name, rig.channels(rng, name, time, x, v, pulled=force(x, v, acceleration)), {}))
@@ -75,12 +74,12 @@ def _hand(
     pulses = ((0.0, 1.0), ((duration - _TURNING) / 2, -2.0), (duration - _TURNING, 1.0))
     x, v, a = np.sum([size * _pulse(t - begin) for begin, size in pulses], axis=0)
     peak = _pulse(np.array([duration / 2]))[0, 0] - 2 * _pulse(np.array([_TURNING / 2]))[0, 0]
-    x, v, a = (far / peak) * x, (far / peak) * v, (far / peak) * a
+    x, v, a = far / peak * np.array([x, v, a])
     w = np.pi / duration
     shape, rate, bend = np.sin(w * t) ** 2, w * np.sin(2 * w * t), 2 * w**2 * np.cos(2 * w * t)
     for frequency in _TREMBLING:
-        q = 2 * np.pi * frequency * float(rng.uniform(0.9, 1.1))
-        phase, size = float(rng.uniform(0, 2 * np.pi)), _TREMOR * float(rng.uniform(0.3, 1.0))
+        q = 2 * np.pi * frequency * rng.uniform(0.9, 1.1)
+        phase, size = rng.uniform(0, 2 * np.pi), _TREMOR * rng.uniform(0.3, 1.0)
         s, c = size * np.sin(q * t + phase), size * np.cos(q * t + phase)
         x = x + shape * s
         v = v + rate * s + shape * q * c
@@ -121,11 +120,10 @@ def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
     """Place at which friction holds the car before a tap: the first is made where the sensor was zeroed."""
     if not rig.holding:
         return {}
+    if not run:
+        return {"x": rig.truth["sensor_zero"]}
     held = rig.truth["friction"] / (2 * rig.truth["k"])
-    place = rig.truth["sensor_zero"]
-    if run:
-        place = held * float(np.random.default_rng([rig.seed, 4, run]).uniform(-0.9, 0.9))
-    return {"x": place}
+    return {"x": held * float(np.random.default_rng([rig.seed, 4, run]).uniform(-0.9, 0.9))}
 
 
 def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
@@ -150,7 +148,7 @@ def _decay(
     duration: float,
     *,
     slips: bool = False,
-) -> tuple[str, dict[str, Any], dict[str, Any]]:
+) -> Run:
     """A run that begins to record a little before the motion begins."""
     begin = float(rng.uniform(0.4, 1.0))
     time, at = sensors.instants(rig, rng, begin + duration)
@@ -158,18 +156,17 @@ def _decay(
     states, _ = simulated(
         system, name, start=start, duration=duration + 0.01, instants=at[moving] - begin, side=rig.truth["motor_side"]
     )
-    held = np.zeros((2, len(at)))
-    held[0] = start.get("x", 0.0)  # held there until it is let go
-    motion = held
+    motion = np.zeros((2, len(at)))
+    motion[0] = start.get("x", 0.0)  # held there until it is let go
     motion[:, moving] = states
     if slips:
         motion[0] -= _slip(rig, at - begin, states)
-    return name, rig.channels(rng, name, time, motion[0], motion[1]), {}
+    return name, rig.channels(rng, name, time, *motion), {}
 
 
 def _slip(rig: VirtualRig, since: FloatArray, states: FloatArray) -> FloatArray:
     """Travel (m) that the sensor misses: within 50 ms the string slips on its wheel, in one of the first swings."""
     rng = np.random.default_rng([rig.seed, 5])
-    begin = float(rng.uniform(0.5, 2.5))
-    missed = float(rng.uniform(0.03, 0.3)) * np.max(np.abs(states[0])) * float(rng.choice([-1.0, 1.0]))
+    begin = rng.uniform(0.5, 2.5)
+    missed = rng.uniform(0.03, 0.3) * np.max(np.abs(states[0])) * rng.choice([-1.0, 1.0])
     return missed * np.clip((since - begin) / 0.05, 0.0, 1.0)

@@ -15,7 +15,7 @@ import numpy as np
 from nonsmooth import Recording
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.rig import sensors
-from nonsmooth_savi2007.rig.physics import Wander, crank_angle, drive
+from nonsmooth_savi2007.rig.physics import crank_angle, drive
 
 if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
@@ -54,17 +54,17 @@ def mean_position(rig: VirtualRig, crank_length: float) -> float:
     return rig.truth["motor_side"] * moved
 
 
-def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander = ()) -> FloatArray:
-    """The times in [begin, end] at which the crank's angle is a multiple of 2 pi.
+def passages(rig: VirtualRig, omega: float, begin: float, end: float, **wander: float) -> FloatArray:
+    """The times in [begin, end] at which the crank's angle is a multiple of 2 pi; ``wander`` as `VirtualRig.wander`.
 
     Each by Newton's method from where even turning has it: the slope is omega (1 +- the ripple), so this contracts.
     """
-    p = rig.named_parameters(omega=omega)
-    first, last = crank_angle(np.array([begin, end]), p, wander) / (2 * np.pi)
+    p = rig.named_parameters(omega=omega, **wander)
+    first, last = crank_angle(np.array([begin, end]), p, bool(wander)) / (2 * np.pi)
     target = 2 * np.pi * np.arange(np.ceil(first), np.floor(last) + 1)
     at = target / omega
     for _ in range(50):
-        off = crank_angle(at, p, wander) - target
+        off = crank_angle(at, p, bool(wander)) - target
         at = at - off / omega
         if np.max(np.abs(off), initial=0.0) < 1e-12:
             break
@@ -77,9 +77,9 @@ def voltage(rig: VirtualRig, *, voltages: Sequence[float] = range(2, 13), turns:
     for i, setting in enumerate(voltages):
         rng = rig.generator("voltage", i)
         omega = frequency(rig, float(setting))
-        begin = float(rng.uniform(0, 2 * np.pi / omega))
-        wander = rig.wander("voltage", i, omega)
-        crossed = passages(rig, omega, begin, begin + turns * 2 * np.pi / omega, wander) - begin
+        begin = rng.uniform(0, 2 * np.pi / omega)
+        end = begin + turns * 2 * np.pi / omega
+        crossed = passages(rig, omega, begin, end, **rig.wander("voltage", i, omega)) - begin
         runs.append((f"Run #{i + 1}", {"Turn": sensors.turns(rig, crossed)}, {"voltage": float(setting)}))
     return rig.recording("voltage", runs)
 
@@ -96,12 +96,12 @@ def crank(
     omega = frequency(rig, voltage)
     for i, length in enumerate(lengths):
         rng, name = rig.generator("crank", i), f"Run #{i + 1}"
-        begin = float(rng.uniform(0, 2 * np.pi / omega))
+        begin = rng.uniform(0, 2 * np.pi / omega)
         time, at = sensors.instants(rig, rng, duration)
-        p = rig.named_parameters(omega=omega, crank_length=float(length))
         wander = rig.wander("crank", i, omega)
-        pulled = rig.truth["motor_side"] * p.k * drive(begin + at, p, p.crank_length, wander)
-        crossed = passages(rig, omega, begin, begin + duration, wander) - begin
+        p = rig.named_parameters(omega=omega, crank_length=float(length), **wander)
+        pulled = rig.truth["motor_side"] * p.k * drive(begin + at, p, p.crank_length, rig.wanders)
+        crossed = passages(rig, omega, begin, begin + duration, **wander) - begin
         channels = {"Force": sensors.force(rig, rng, name, time, pulled), "Turn": sensors.turns(rig, crossed)}
         runs.append((name, channels, {"crank_length": float(length), "voltage": voltage}))
     return rig.recording("crank", runs)

@@ -43,21 +43,19 @@ WANDERING = 3  # slow terms of a motor that wanders
 #: What of the truth the equations of the car hold.
 OF_THE_CAR = ("m", "k", "k_s", "c", "c_s", "g", "friction", "creep_velocity", "pretension", "ripple", "ripple_phase")
 
-#: Slow terms of the motor's angle: size (rad), rate (rad/s) and phase (rad) of each.
-Wander = tuple[tuple[Any, Any, Any], ...]
 
-
-def crank_angle(t: Any, p: Any, wander: Wander = ()) -> Any:
-    """The crank's angle: even turning, a motor's slow wander, and a ripple that repeats with each turn."""
+def crank_angle(t: Any, p: Any, wanders: bool = False) -> Any:
+    """The crank's angle: even turning, the slow terms of a motor that wanders, a ripple that repeats with each turn."""
     turned = p.omega * t
-    for size, rate, phase in wander:
+    for j in range(1, WANDERING + 1) if wanders else ():
+        size, rate, phase = (getattr(p, f"wander_{word}{j}") for word in ("", "rate_", "phase_"))
         turned = turned + size * np.sin(rate * t + phase)
     return turned + p.ripple * np.sin(turned + p.ripple_phase)
 
 
-def drive(t: Any, p: Any, crank_length: Any, wander: Wander = ()) -> Any:
+def drive(t: Any, p: Any, crank_length: Any, wanders: bool = False) -> Any:
     """Displacement d of the driven end, with the string's curvature 1/L; exact also for 1/L = 0."""
-    phi = crank_angle(t, p, wander)
+    phi = crank_angle(t, p, wanders)
     square = (crank_length * np.sin(phi)) ** 2 * p.curvature
     return crank_length * np.cos(phi) + square / (1.0 + np.sqrt(1.0 - square * p.curvature))
 
@@ -67,9 +65,9 @@ def friction(v: Any, p: Any) -> Any:
     return p.c * v + p.friction * np.tanh(v / p.creep_velocity)
 
 
-def driven_tension(t: Any, x: Any, p: Any, crank_length: Any, side: float = 1.0, wander: Wander = ()) -> Any:
+def driven_tension(t: Any, x: Any, p: Any, crank_length: Any, side: float = 1.0, wanders: bool = False) -> Any:
     """Tension of the string at the driven spring; below zero it would have to push."""
-    return p.pretension + p.k * (drive(t, p, crank_length, wander) - side * x)
+    return p.pretension + p.k * (drive(t, p, crank_length, wanders) - side * x)
 
 
 def fixed_tension(x: Any, p: Any, side: float = 1.0) -> Any:
@@ -80,14 +78,6 @@ def fixed_tension(x: Any, p: Any, side: float = 1.0) -> Any:
 def support_force(x: Any, v: Any, p: Any) -> Any:
     """Force of the support on the car in contact."""
     return -(p.k_s * (x - p.g) + p.c_s * v)
-
-
-def wander_of(p: Any) -> Wander:
-    """The slow terms of the motor's angle among the parameters of a system whose motor wanders."""
-    return tuple(
-        (getattr(p, f"wander_{j}"), getattr(p, f"wander_rate_{j}"), getattr(p, f"wander_phase_{j}"))
-        for j in range(1, WANDERING + 1)
-    )
 
 
 @cache
@@ -107,7 +97,7 @@ def hanging_mass() -> System:
 
 
 @cache
-def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False, side: int = 1) -> System:
+def car(*, relaxing: bool = True, rising: bool = False, wanders: bool = False, side: int = 1) -> System:
     """The car with its springs, strings and support.
 
     Parameters
@@ -118,7 +108,7 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
     rising : bool
         Whether the length of the crank grows at ``crank_rate`` (state ``a`` in place of the parameter
         ``crank_length``), for quasi-static rises of the forcing.
-    wandering : bool
+    wanders : bool
         Whether the motor wanders: further parameters, and no forcing period.
     side : {1, -1}
         Side of the motor: that of the support, or the other.
@@ -132,7 +122,7 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
     """
 
     def driven(t: Any, u: Any, p: Any) -> Any:
-        return driven_tension(t, u.x, p, u.a if rising else p.crank_length, side, wander_of(p) if wandering else ())
+        return driven_tension(t, u.x, p, u.a if rising else p.crank_length, side, wanders)
 
     def fixed(t: Any, u: Any, p: Any) -> Any:
         return fixed_tension(u.x, p, side)
@@ -192,7 +182,7 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
     parameters = {name: (published()[name], UNITS[name]) for name in OF_THE_CAR}
     parameters |= {"curvature": (1.0, "1/m"), "omega": (4.5, "rad/s")}
     parameters |= {"crank_rate": (0.0, "m/s")} if rising else {"crank_length": (0.0165, "m")}
-    for j in range(1, WANDERING + 1) if wandering else ():
+    for j in range(1, WANDERING + 1) if wanders else ():
         parameters |= {f"wander_{j}": (0.0, "rad"), f"wander_phase_{j}": (0.0, "rad")}
         parameters |= {f"wander_rate_{j}": (1.0, "rad/s")}
     states = {"x": "m", "v": "m/s"} | ({"y": "m"} if relaxing else {}) | ({"a": "m"} if rising else {})
@@ -204,7 +194,7 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
         indicators=indicators,
         transitions=transitions,
         scale={name: {"x": 1e-3, "v": 1e-2, "y": 1e-5, "a": 1e-2}[name] for name in states},
-        period=None if wandering else lambda p: 2 * np.pi / p.omega,
+        period=None if wanders else lambda p: 2 * np.pi / p.omega,
     )
 
 
@@ -263,9 +253,7 @@ def _check_strings(system: System, run: str, result: xr.Dataset, side: float) ->
         return
     length = p.crank_length if "crank_length" in system.parameters else u["a"]
     tensions = {
-        "driven": driven_tension(
-            result["time"].values, u["x"], p, length, side, wander_of(p) if hasattr(p, "wander_1") else ()
-        ),
+        "driven": driven_tension(result["time"].values, u["x"], p, length, side, hasattr(p, "wander_1")),
         "fixed": fixed_tension(u["x"], p, side),
     }
     for which, tension in tensions.items():

@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from nonsmooth import Recording, System
+from nonsmooth import Recording, SimulatedRig, System
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES
 from nonsmooth_savi2007.rig import driven, figures, hand, motor, sensors
-from nonsmooth_savi2007.rig.live import LiveRig
 from nonsmooth_savi2007.rig.notebook import write_session
-from nonsmooth_savi2007.rig.physics import OF_THE_CAR, WANDERING, Wander, car
+from nonsmooth_savi2007.rig.physics import METHOD, OF_THE_CAR, WANDERING, car
 from nonsmooth_savi2007.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward, drawn, published, switched
 
 #: The procedures of Section 3.1 and those for the gap: what identification needs.
@@ -105,7 +104,7 @@ class VirtualRig:
         """The rig as a ``System`` with the truth's parameters; ``rising`` with the crank's length as a slow state."""
 
         side = int(self.truth["motor_side"])
-        equations = car(relaxing=self.support_relaxation, rising=rising, wandering=self.wanders, side=side)
+        equations = car(relaxing=self.support_relaxation, rising=rising, wanders=self.wanders, side=side)
         return equations.with_parameters(self.parameters(rising=rising))
 
     @property
@@ -113,15 +112,16 @@ class VirtualRig:
         """Return whether the motor's frequency wanders."""
         return self.truth["motor_wander"] > 0
 
-    def wander(self, procedure: str, run: int, omega: float) -> Wander:
-        """The slow terms of the motor's angle in one run: periods of 2 to 60 s, the same part of the variance each."""
+    def wander(self, procedure: str, run: int, omega: float) -> dict[str, float]:
+        """Parameters of the motor's slow terms in one run: periods of 2 to 60 s, the same part of the variance each."""
         if not self.wanders:
-            return ()
+            return {}
         rng = np.random.default_rng([self.seed, 2, list(PROCEDURES).index(procedure), run])
         rates = 2 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(60.0), WANDERING))
         phases = rng.uniform(0.0, 2 * np.pi, WANDERING)
         sizes = omega * self.truth["motor_wander"] * np.sqrt(2 / WANDERING) / rates
-        return tuple(zip(sizes.tolist(), rates.tolist(), phases.tolist(), strict=True))
+        terms = {"wander": sizes, "wander_rate": rates, "wander_phase": phases}
+        return {f"{name}_{j}": one for name, row in terms.items() for j, one in enumerate(row.tolist(), 1)}
 
     def parameters(self, *, rising: bool = False, **settings: float) -> dict[str, float]:
         """Values of the system's parameters: the truth, and the settings of a run (omega, crank_length, g)."""
@@ -158,38 +158,16 @@ class VirtualRig:
     def recording(self, procedure: str, runs: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any]]]) -> Recording:
         """The runs (name, sensors, settings) as a Recording that says that it is synthetic."""
 
-        record = {
-            "file": "",
-            "format": "virtual rig",
-            "procedure": procedure,
-            "seed": self.seed,
-            "features": self.on,
-        }
+        told = {"file": "", "format": "virtual rig", "procedure": procedure, "seed": self.seed, "features": self.on}
         return Recording.from_runs(
             {name: dict(channels) for name, channels, _ in runs},
             synthetic=True,
-            source=record,
+            source=told,
             run_attrs={name: {"procedure": procedure, **stated} for name, _, stated in runs},
         )
 
     def live(self, *, gap: float, crank_length: float, omega: float = 4.5, run: int = 0) -> LiveRig:
-        """The rig as the three methods that :func:`nonsmooth.control_based_continuation` takes.
-
-        Parameters
-        ----------
-        gap : float
-            Gap (m) from the car's mean position under a crank of this length.
-        crank_length, omega : float
-            The drive at the beginning (m, rad/s).
-        run : int
-            Number of the run, which has noise of its own.
-
-        Raises
-        ------
-        ValueError
-            A motor that wanders: it has no phase to which a reference could be tied.
-        """
-
+        """The rig as the three methods that :func:`nonsmooth.control_based_continuation` takes; see `LiveRig`."""
         return LiveRig(self, gap=gap, crank_length=crank_length, omega=omega, run=run)
 
     # Procedures
@@ -260,3 +238,54 @@ class VirtualRig:
         """
         title = f"virtual rig, seed {self.seed}, Fig. {number}"
         return write_session(self, folder, self.figure(number, **options), truth, title=title)
+
+
+class LiveRig(SimulatedRig):
+    """A virtual rig as the three methods of a live one.
+
+    The position is read in counts of the rotary sensor, at the interface's 100 Hz with its jitter; the motor turns at
+    the frequency of the nearest step of its voltage. The actuator is one that the paper's rig has not: it pushes the
+    car with the force that it is told to, without error or delay.
+
+    Parameters
+    ----------
+    rig : VirtualRig
+    gap : float
+        Gap (m) from the car's mean position under the drive of this crank.
+    crank_length : float
+        Length of the crank (m) at the beginning.
+    omega : float
+        Frequency of the drive (rad/s) at the beginning.
+    run : int
+        Number of the run, which has random numbers of its own.
+
+    Raises
+    ------
+    ValueError
+        A motor that wanders: it has no phase to which a reference could be tied.
+    """
+
+    def __init__(self, rig: VirtualRig, *, gap: float, crank_length: float, omega: float = 4.5, run: int = 0) -> None:
+        if rig.wanders:
+            raise ValueError("a motor that wanders has no phase to which a reference could be tied: motor_wander = 0")
+        self._rig, at_rest = rig, rig.true_gap(figures.screw_for(rig, gap, crank_length))
+        super().__init__(
+            rig.system().with_parameters(rig.parameters(omega=omega, crank_length=crank_length, g=at_rest)),
+            amplitude="crank_length",
+            rate=sensors.RATE,
+            resolution=sensors.COUNT if rig.quantisation else 0.0,
+            jitter=rig.truth["clock_jitter"],
+            seed=rig.seed + 1000 * run,
+            start={"x": min(0.0, at_rest)},
+            method=METHOD["method"],
+        )
+        self.units["force"] = "N"
+
+    def set_drive(self, frequency: float, amplitude: float) -> tuple[float, float]:
+        """Set the motor's voltage and the crank; return the frequency (rad/s) that it turns at, and the crank (m)."""
+        return super().set_drive(motor.frequency(self._rig, motor.voltage_for(self._rig, frequency)), amplitude)
+
+    def reading(self, position: float) -> float:
+        """Return what the rotary sensor shows at a position (m)."""
+        counts = self._rig.truth["encoder_zero"] * sensors.COUNT - self._rig.truth["sensor_zero"]
+        return super().reading(position + counts)
