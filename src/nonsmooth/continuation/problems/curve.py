@@ -199,8 +199,10 @@ class Curve(ABC, Generic[P]):
             length = float(np.abs(step).max())
             if not length < self.longest or (i > 1 and length > self.grows * last and length > 1e-10):
                 return None
-            # Beside a square root the slopes are so steep that steps are small far from the solution: there they grow.
-            shrinks = length <= last if i else float(np.abs(right).max()) < SMALL
+            # Beside a square root the slopes are so steep that steps are small far from the solution: there they grow,
+            # and what is left behind one, length^3 / last^2 of a quadratic convergence, is more than its square.
+            left = length * (length / last) ** 2 if i else 0.0
+            shrinks = length <= last and left < CLOSE if i else float(np.abs(right).max()) < SMALL
             if (length < tolerance and shrinks) or (i > 3 and length < 1e-10):
                 if length > 1e-14:  # the last evaluation serves; its error is the square of this step
                     Y = Y - step
