@@ -47,16 +47,15 @@ def _check(system: System, content: dict[str, Any], velocity: str, mass: str | f
         raise ValueError(unknown(mass, "a parameter", name, {k: one.unit for k, one in system.parameters.items()}))
     if "period" not in content:
         raise SystemDefinitionError(f"{name} has no forcing period, with which the reference of a controller repeats")
-    if system.is_smoothed or system.traced.asks:
+    if system.is_smoothed:
         raise SystemDefinitionError(
-            f"{name} is smoothed, or has so many elements that its modes are not written out: an actuator is added to "
-            "the fields of modes; give the system before `smoothed`, or with fewer elements"
+            f"{name} is smoothed: an actuator is added to the fields of modes; give the system before `smoothed`"
         )
     held = [mode for mode, rates in content["modes"].items() if rates.get(velocity, "0") == "0"]
     if held:
         raise SystemDefinitionError(
-            f"{name}: in mode {held[0]!r} no force acts on {velocity!r}, so that no controller could end it; give a "
-            "system whose contacts are elastic"
+            f"{name}: in mode {held[0]!r} no force acts on {velocity!r}, so that no controller could end it; give its "
+            "contacts and frictions as elements (ns.elements), which the force of an actuator moves like any other"
         )
 
 
