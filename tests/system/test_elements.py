@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from functools import partial
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -496,45 +495,3 @@ def test_what_sticks_or_rests_keeps_no_speed(impacts: str) -> None:
         ]
         assert sum(held) > 4
         assert not run.u_after.values[held, 1].any()
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "says"),
-    [
-        ("mu", -0.1, "the friction of element 'rub' must not be negative"),
-        ("mu", 0.3, "the static friction of element 'rub' must not be less than its kinetic friction"),
-        ("k", -1.0, "the stiffness of element 'wall' must not be negative"),
-        ("b", -0.1, "the half width of element 'play' must not be negative"),
-        ("P", -1.0, "the preload of element 'pre' must not be negative"),
-    ],
-)
-def test_what_an_element_may_be_is_asked_wherever_a_value_is_given(name: str, value: float, says: str) -> None:
-    """At definition, later, along a sweep or a ramp, read from text; not of what a fit has found or tries."""
-    given = {"mu": 0.1, "ms": 0.2, "k": 3.0, "b": 0.1, "P": 0.1}
-
-    def made(values: dict[str, float]) -> ns.System:
-        elements = {
-            "rub": Coulomb(at="q", friction="mu", static="ms"),
-            "wall": ElasticStop(at="q", position=1.0, stiffness="k"),
-            "play": Backlash(at="q", half_width="b", stiffness=1.0),
-            "pre": PreloadedSpring(at="q", preload="P", stiffness=0.2),
-        }
-        forcing = {"q": lambda t, p: np.cos(1.2 * t)}
-        return ns.mechanical(1.0, 0.1, 1.0, parameters=values, forcing=forcing, elements=elements)
-
-    system, some = made(given), [given[name], value]
-    assert system.with_parameters(mu=0.0, k=0.0, b=0.0, P=0.0).values["mu"] == 0.0
-    ways = {
-        "definition": lambda: made({**given, name: value}),
-        "later": lambda: system.with_parameters({name: value}),
-        "text": lambda: ns.System.from_text(system.to_text()).with_parameters({name: value}),
-        "sweep": lambda: ns.sweep(system, name, some, progress=False),
-        "chart": lambda: ns.chart(system, {name: some, "P": [0.1, 0.2]} if name != "P" else {"P": some, "k": [1, 2]}),
-        "ramp": lambda: ns.simulate(system, periods=2, ramps={name: tuple(some)}),
-        "exponents": lambda: ns.lyapunov(system, parameter=name, values=some, progress=False),
-    }
-    for call in ways.values():
-        with pytest.raises(ns.SystemDefinitionError, match=says):
-            call()
-    found = SimpleNamespace(values={name: value}, covariance=np.eye(1))
-    assert system.with_parameters(found).values[name] == value

@@ -20,7 +20,6 @@ from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.arguments import checked, declared
 from nonsmooth.system.kinds import at_least, real_number
 from nonsmooth.system.system import System
-from nonsmooth.system.variant import Tried
 
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 
@@ -229,7 +228,7 @@ def to_first_order(
     for i, (name, error) in enumerate(sources):
         if (lost := np.isnan(slope[:, i])).any():  # of equilibria: by differences of whole branches
             value, h = system.values[name], DIFFERENCE * error
-            ends = [call(system.with_parameters(Tried({name: value + sign * h})), coarse=True) for sign in (1, -1)]
+            ends = [call(system.with_parameters({name: value + sign * h}), coarse=True) for sign in (1, -1)]
             ahead, behind = (matched(branch, one, "special") for one in ends)
             slope[lost, i] = ((ahead - behind) / (2 * h))[lost]
     for i, name in zip(*np.nonzero(np.isnan(slope)), strict=True):

@@ -61,7 +61,6 @@ class Description:
     symmetry: Symmetry | None = None
     explicit_time: bool = False  # depends on the time, and not periodically
     ranges: tuple[tuple[sp.Expr, str], ...] = ()  # of the parameters: what must not be negative, and what to say
-    limits: tuple[tuple[sp.Expr, str], ...] = ()  # the same of what is given; a fit may try what lies beyond
     plain: Callable[[], tuple[Traced, tuple[TracedSurface, ...]]] | None = field(
         default=None, compare=False, repr=False
     )  # without elements
@@ -190,7 +189,6 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
         explicit_time=explicit,
         ranges=tuple(made.get("ranges", ())),
-        limits=tuple(made.get("limits", ())),
         plain=made.get("plain"),
         loads=loads,
         inputs=given["inputs"],

@@ -26,12 +26,6 @@ from nonsmooth.system.symbolic.traced import Traced, along
 SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
 
 
-class Tried(dict[str, float]):
-    """Values of parameters that a fit tries: to a small friction it may come from beyond zero."""
-
-    covariance = None
-
-
 class Variant:
     """A traced system, its derivatives, and what its parameters must fulfil; shared by all copies."""
 
@@ -63,7 +57,7 @@ class Variant:
         self.name, self.parameters = description.name, dict(description.parameters)
         for name, of in self.etas:
             self.parameters[name] = Parameter(0.0, "", r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}")
-        self.domain = Domain(self.traced, (*description.ranges, *extra), description.limits)
+        self.domain = Domain(self.traced, (*description.ranges, *extra))
         tables = {
             "states": description.states,
             "memory": {name: unit for name, (_, unit) in self.memory.items()},
@@ -122,9 +116,7 @@ class Variant:
             )
 
     def changed(self, values: Mapping[str, float], given: Any, named: Mapping[str, float]) -> dict[str, float]:
-        """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it.
-
-        What a fit tries or has found (it has a ``covariance``) is not held to what is asked of given values."""
+        """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it."""
         changes = dict(named)
         if given is not None:
             mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
@@ -142,7 +134,7 @@ class Variant:
         for key, _ in self.etas:
             if key in changes:
                 _positive(new[key], key)
-        self.domain.check(new, changes, tried=hasattr(given, "covariance"))
+        self.domain.check(new, changes)
         return new
 
     def rows(self, values: Mapping[str, float], columns: Mapping[str, Any]) -> np.ndarray:

@@ -16,7 +16,6 @@ from nonsmooth.identification.finding import normal_draws
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.kinds import ends, real_number
 from nonsmooth.system.system import System
-from nonsmooth.system.variant import Tried
 
 Rule = Callable[[Mapping[str, float]], float]
 
@@ -70,7 +69,7 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
 def nominal(system: System, parameters: Mapping[str, float] | None, settings: Settings) -> System:
     """The system at the identified parameters and at the run's settings; settings win."""
     if parameters is not None:
-        system = system.with_parameters(Tried(parameters) if hasattr(parameters, "covariance") else dict(parameters))
+        system = system.with_parameters(dict(parameters))
     return system.with_parameters(settled(settings, system.values))
 
 
@@ -118,7 +117,7 @@ def draw_systems(
             known = {**base.values, **row}
             row |= {name: one.at(known) + float(beside[name][i]) for name, one in settings.items() if one.follows}
             try:
-                drawn = base.with_parameters(Tried(row))
+                drawn = base.with_parameters(row)
             except (SystemDefinitionError, ValueError):
                 refused += 1
                 continue

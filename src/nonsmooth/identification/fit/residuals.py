@@ -13,7 +13,6 @@ from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.identification.fit.motion import SampledMotion
 from nonsmooth.results.labels import labels_of
 from nonsmooth.system.system import System
-from nonsmooth.system.variant import Tried
 
 _NEAR = 1.5  # sampling steps from a transition or a graze
 _GRAZING = 0.03  # clearance over the largest size of the indicator, below which a touch is a graze
@@ -136,7 +135,7 @@ def by_place(data: xr.Dataset) -> list[tuple[str, float, int]]:
 def _nominal(grown: Grown) -> System:
     u = grown.problem.unknowns
     found = {name: float(value) for name, value in zip(u.names, grown.theta, strict=True) if name in u.active}
-    return grown.problem.system.with_parameters(Tried(found))
+    return grown.problem.system.with_parameters(found)
 
 
 def _places(system: System) -> tuple[list[str], dict[tuple[str, int], int]]:

@@ -25,7 +25,6 @@ from nonsmooth.identification.fit.steady import SteadyReadings, predicted
 from nonsmooth.identification.fit.unknowns import Unknowns
 from nonsmooth.recordings.signals.spectrum import correlation_times
 from nonsmooth.system.system import System
-from nonsmooth.system.variant import Tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +173,7 @@ class Windows:
         own = dict(zip(u.active, map(float, theta[places]), strict=False))
         values: FloatArray | None = None
         with suppress(SystemDefinitionError, ValueError):
-            values = self.system.with_parameters(Tried({**own, **self.runs[run].settings})).parameter_vector()
+            values = self.system.with_parameters({**own, **self.runs[run].settings}).parameter_vector()
         clock = float(theta[u.clock_place(run)]) if u.clock else 1.0
         there = There(values, sensors, clock, float(theta[places[-1]]) if u.phases else 0.0)
         self._kept[run] = key, there

@@ -169,7 +169,7 @@ def _written_out(
         "transitions": transitions,
         "indicators": {**given["indicators"], **{key: KnownFunction(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
-        **make.ranges(next(iter(base))),
+        "ranges": make.ranges(next(iter(base))),
         "bind": partial(decider.bind, kinds=kinds, asked=asked) if decider else None,
         "make": make,
     }
@@ -223,7 +223,7 @@ def _opened(make: Expressions, given: Mapping[str, Any], why: str, patterns: Pat
         "transitions": (),
         "indicators": {key: KnownFunction(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
         "outputs": given["outputs"],
-        **make.ranges(patterns.mode),
+        "ranges": make.ranges(patterns.mode),
         "bind": patterns.bind,
         "make": make,
     }

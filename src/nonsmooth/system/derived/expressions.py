@@ -196,25 +196,18 @@ class Expressions(Assembler):
 
     # What a user would have written
 
-    def ranges(self, mode: str) -> dict[str, list[tuple[sp.Expr, str]]]:
-        """``ranges``, expressions of the parameters that must not be negative, each with the sentence for where it is,
-        and ``limits``, those that may be where a fit tries it.
+    def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
+        """Expressions of the parameters that must not be negative, each with the sentence for where it is.
 
-        Where one is with the parameters as they are given, the sentence is raised."""
-        known, found = set(self.symbols.p.values()), {"ranges": list[Any](), "limits": list[Any]()}
+        Where a number is, or what must not be with the parameters as they are given, the sentence is raised."""
+        known, found = set(self.symbols.p.values()), []
         for k in range(len(self.parts)):
             here = self.place(k, mode, (0,) * len(self.parts))
             rows = [(sp.sympify(e), text) for e, text in here.element.ranges(here)]
-            given = [(sp.sympify(e), text) for e, text in here.element.limits(here)]
-            for kept_to, of in ((found["ranges"], rows), (found["limits"], given)):
-                kept_to += [(e, text) for e, text in of if e.free_symbols and e.free_symbols <= known]
+            found += [(e, text) for e, text in rows if e.free_symbols and e.free_symbols <= known]
             read = isinstance(here.element.given, str)  # of a text: it was given before, at other values maybe
-            at = (
-                []
-                if read
-                else [(sp.sympify(sp.sympify(e).xreplace(self.values)), t) for e, t in (*given, here.effect())]
-            )
-            for e, sentence in (*rows, *at):
+            given = () if read else (*here.element.limits(here), here.effect())
+            for e, sentence in (*rows, *((sp.sympify(sp.sympify(e).xreplace(self.values)), text) for e, text in given)):
                 if e.is_number and e < 0:
                     raise SystemDefinitionError(sentence)
         return found

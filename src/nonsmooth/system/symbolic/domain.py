@@ -160,11 +160,9 @@ class _Rule:
 
 class Domain:
     """The conditions on the parameters of a traced system; ``apart`` are further expressions of them that must not be
-    negative, each with its message, ``limits`` those that may be where a fit tries it."""
+    negative, each with its message."""
 
-    def __init__(
-        self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = (), limits: Iterable[tuple[sp.Expr, str]] = ()
-    ) -> None:
+    def __init__(self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = ()) -> None:
         self._names = traced.parameter_names
         self._zero: dict[str, str] = {}  # parameter -> what divides by it
         self._rules: list[_Rule] = []
@@ -188,17 +186,14 @@ class Domain:
             self._rules.append(_Rule(traced.period, "period", "", traced))
         self._rules += [_Rule(phase, "phase", owner, traced) for owner, phase in phases.items()]
         self._rules += [_Rule(expression, "apart", message, traced) for expression, message in apart]
-        self._of_given = [*self._rules, *(_Rule(entry, "apart", message, traced) for entry, message in limits)]
 
-    def check(
-        self, values: Mapping[str, float], changed: Collection[str] | None = None, *, tried: bool = False
-    ) -> None:
+    def check(self, values: Mapping[str, float], changed: Collection[str] | None = None) -> None:
         """Raise SystemDefinitionError where ``values`` are not allowed; only what depends on those that ``changed`` has
-        to be looked at. Of what a fit tries limits are not asked."""
+        to be looked at."""
         for name in values if changed is None else changed:
             if name in self._zero and values[name] == 0:
                 raise SystemDefinitionError(self._by_zero(name))
-        for rule in self._rules if tried else self._of_given:
+        for rule in self._rules:
             if changed is None or any(name in changed for name in rule.used):
                 rule.check(values)
 
@@ -213,7 +208,7 @@ class Domain:
         for name in self._zero:
             if (points[:, self._names.index(name)] == 0).any():
                 raise SystemDefinitionError(self._by_zero(name))
-        for rule in self._of_given:
+        for rule in self._rules:
             with np.errstate(all="ignore"):
                 refused = ~np.broadcast_to(rule.allows(rule.of_rows(*points.T)), len(points))
             if refused.any():

@@ -141,7 +141,7 @@ class Element(ABC):
         return []
 
     def limits(self, here: Place) -> list[tuple[Any, str]]:
-        """The same of all values that are given; a fit may come from beyond zero to a value beside it."""
+        """The same of the parameters as they are given: a fit may come from beyond zero to a value beside it."""
         return []
 
     @abstractmethod
