@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, ElasticStop, PreloadedSpring, Stop
-from nonsmooth.flow.engines.patterns import PatternTables
+from nonsmooth.flow.engines.pattern_tables import PatternTables
 from nonsmooth.system.derived import combinations
 
 LAW = {"w": 0.3, "mu": 0.3}  # impacts, rest, slip and stick in each period

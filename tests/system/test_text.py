@@ -283,6 +283,10 @@ def damaged(change):
     return json.dumps(content)
 
 
+def test_a_text_of_version_1_without_elements_is_read():
+    assert System.from_text(damaged(lambda d: d.update(version=1))) == models.discontinuous_support()
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
@@ -290,6 +294,10 @@ def damaged(change):
         ("[]", '"format"'),
         ("{}", '"format"'),
         (damaged(lambda d: d.update(version=99)), "version 99"),
+        (
+            damaged(lambda d: d.update(version=1, elements={})),
+            "version 1; .* reads 2, and 1 of systems without elements",
+        ),
         (damaged(lambda d: d.pop("modes")), "'modes' is missing"),
         (damaged(lambda d: d["indicators"].update(penetration="__import__('os')")), "not allowed"),
         (damaged(lambda d: d["transitions"][0].update(target="nowhere")), "`nowhere` is not a mode"),

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 _FORMAT = "nonsmooth system"
-_VERSION = 1
+_VERSION = 2
+_CHANGED = {"elements", "loads"}  # are written in another way than by version 1
 _SAID = 1000  # characters of what is wrong with a text
 
 
@@ -192,10 +193,11 @@ def read_system(text: str) -> System:
         raise SystemDefinitionError(f"this is not the text of a system (JSON expected): {error}") from None
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise SystemDefinitionError(f'this is not the text of a system: "format": "{_FORMAT}" is missing')
-    if content.get("version") != _VERSION:
+    version = content.get("version")
+    if version != _VERSION and (version != 1 or _CHANGED & content.keys()):
         raise SystemDefinitionError(
-            f"the text of the system has version {shortened(content.get('version'))}; this version of nonsmooth reads "
-            f"{_VERSION}"
+            f"the text of the system has version {shortened(version)}; this version of nonsmooth reads {_VERSION}, and "
+            "1 of systems without elements and not made by ns.mechanical: define the system anew, and write it again"
         )
     try:
         reader = _Reader(content)

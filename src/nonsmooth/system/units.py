@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from math import pi
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -66,23 +65,16 @@ def read_unit(text: str) -> Unit | None:
     return product(*found) if len(outer) == 1 and sign == 1 else None
 
 
-_PREFIXES = {"n": 1e-9, "u": 1e-6, "\N{MICRO SIGN}": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
-_SCALED: dict[str, tuple[float, Unit]] = {"g": (1e-3, {"kg": 1}), "kg": (1.0, {"kg": 1}), "deg": (pi / 180, {})}
+_PREFIXES = {"n": -9, "u": -6, "\N{MICRO SIGN}": -6, "m": -3, "c": -2, "k": 3, "M": 6}
 
 
-def ratio(one: Unit, other: Unit) -> float | None:
-    """Return how many of another unit are one of this (``mm`` to ``m``: 1e-3); None where they measure other things."""
-    factor, left = 1.0, dict[str, float]()
-    for unit, turned in ((one, 1), (other, -1)):
-        for name, power in unit.items():
-            size, base = _SCALED.get(name, (1.0, {name: 1}))
-            if name[1:] in (*_DERIVED, "m", "s", "g", "V", "A", "K") and name[0] in _PREFIXES and name not in _SCALED:
-                more, base = _SCALED.get(name[1:], (1.0, _DERIVED.get(name[1:], {name[1:]: 1})))
-                size = _PREFIXES[name[0]] * more
-            factor *= size ** (turned * power)
-            for key, of in base.items():
-                left[key] = left.get(key, 0) + turned * power * of
-    return None if any(left.values()) else factor
+def power_between(one: str, other: str) -> int | None:
+    """Return the power of ten between two units of which one is the other with a prefix, ``-3`` of ``"mm"`` and
+    ``"m"``; None of any others."""
+    for prefix, power in {"": 0, **_PREFIXES}.items():
+        if one == prefix + other or other == prefix + one:
+            return power if one == prefix + other else -power
+    return None
 
 
 def product(*units: Unit | None) -> Unit | None:

@@ -18,7 +18,7 @@ from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.kinds import float_array, real_number
 from nonsmooth.system.system import System
-from nonsmooth.system.units import ratio, read_unit
+from nonsmooth.system.units import power_between, read_unit
 
 CALIBRATES = 5.0  # a gain farther than this factor from that of two units is none of a calibration
 FORMS = (
@@ -126,11 +126,11 @@ def _compare_units(
         one, other = read_unit(theirs), read_unit(ours)
         if one is None or other is None:
             continue
-        factor = ratio(other, one)
+        power = power_between(ours, theirs)
         if one != other and gain == 1.0:
             said = "numbers are compared as they are"
-        elif factor is not None and not 1 / CALIBRATES < abs(gain) / factor < CALIBRATES:
-            said = f"that is {factor:.6g} of the former to one of the latter, and the gain is {gain:.6g}"
+        elif power is not None and not 1 / CALIBRATES < abs(gain) / 10.0**power < CALIBRATES:
+            said = f"that is {10.0**power:g} of the former to one of the latter, and the gain is {gain:.6g}"
         else:
             continue
         warnings.warn(

@@ -98,9 +98,8 @@ class _SlidingModes(Additions):
         self.moving = {traced.t, *traced.u, *traced.m}
         self.kappa = sp.Integer(1) if traced.period is None else 2 * sp.pi / traced.period
         self.lacking = list(traced.lacking)
-        self.sliding: dict[
-            TracedSurface, int
-        ] = {}  # the mode in which motion slides along a surface; none where it cannot
+        #: The mode in which motion slides along a surface; none where it cannot.
+        self.sliding: dict[TracedSurface, int] = {}
         self.cells = [frozenset({mode}) for mode in range(len(self.modes))]  # declared modes that meet in each mode
         self.along = [frozenset[int]() for _ in self.modes]  # the indicators that each mode keeps at zero
 
