@@ -22,6 +22,7 @@ DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
+SLOWS = 0.1  # of the step before: where steps do not become smaller, rounding makes them
 AGAIN = 1e-7  # in scaled unknowns: as near as a branch comes back to a point of its own, both solved
 STEP = 1e-5  # of differences, in scaled unknowns
 #: The word of a curve (of orbits: the signature), the unknowns, and what other curves of the branch have of them.
@@ -203,7 +204,7 @@ class Curve(ABC, Generic[P]):
             # and what is left behind one, length^3 / last^2 of a quadratic convergence, is more than its square.
             left = length * (length / last) ** 2 if i else 0.0
             shrinks = length <= last and left < CLOSE if i else float(np.abs(right).max()) < SMALL
-            if (length < tolerance and shrinks) or (i > 3 and length < 1e-10):
+            if (length < tolerance and shrinks) or (i > 3 and 1e-10 > length > SLOWS * last):
                 if length > 1e-14:  # the last evaluation serves; its error is the square of this step
                     Y = Y - step
                     solved = self.moved(solved, Y)
