@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, partial
+from functools import lru_cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -39,7 +39,7 @@ _RECORDED = {
 Motions: TypeAlias = "dict[str, tuple[xr.Dataset, dict[str, Any]]]"
 
 
-@cache
+@lru_cache(maxsize=8)
 def motions(bench: Laboratory, number: int) -> Motions:
     """Record what stands behind a figure and measure each run: the motion and its settings by ``<value>``.
 
