@@ -22,7 +22,7 @@ DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
-SLOWS = 0.1  # of the step before: where steps do not become smaller, rounding makes them
+ROUNDED = 1e-10  # residual: one that is smaller, and not half of that before, is rounding
 AGAIN = 1e-7  # in scaled unknowns: as near as a branch comes back to a point of its own, both solved
 STEP = 1e-5  # of differences, in scaled unknowns
 #: The word of a curve (of orbits: the signature), the unknowns, and what other curves of the branch have of them.
@@ -187,7 +187,7 @@ class Curve(ABC, Generic[P]):
         """
         tolerance = self.tolerance if tolerance is None else tolerance
         right = np.empty(self.n)
-        last = np.inf
+        last = before = np.inf
         for i in range(most or self.most):
             with np.errstate(over="ignore", invalid="ignore"):  # of a guess that leads nowhere
                 solved = self.evaluate(Y)
@@ -197,20 +197,21 @@ class Curve(ABC, Generic[P]):
                     step = (shortest if singular else solve)(self.bordered(solved, border), right)
                 except np.linalg.LinAlgError:
                     return None
-            length = float(np.abs(step).max())
-            if not length < self.longest or (i > 1 and length > self.grows * last and length > 1e-10):
+            length, size = float(np.abs(step).max()), float(np.abs(right).max())
+            rounded = 0.5 * before < size < ROUNDED  # beside impacts that all but vanish it makes steps of 1e-9
+            if not length < self.longest or (i > 1 and length > self.grows * last and length > 1e-10 and not rounded):
                 return None
             # Beside a square root the slopes are so steep that steps are small far from the solution: there they grow,
             # and what is left behind one, length^3 / last^2 of a quadratic convergence, is more than its square.
             left = length * (length / last) ** 2 if i else 0.0
-            shrinks = length <= last and left < CLOSE if i else float(np.abs(right).max()) < SMALL
-            if (length < tolerance and shrinks) or (i > 3 and 1e-10 > length > SLOWS * last):
-                if length > 1e-14:  # the last evaluation serves; its error is the square of this step
+            shrinks = length <= last and left < CLOSE if i else size < SMALL
+            if (length < tolerance and shrinks) or rounded:
+                if 1e-14 < length < DONE:  # the last evaluation serves; its error is the square of this step
                     Y = Y - step
                     solved = self.moved(solved, Y)
                 return solved, Y, i
             Y = Y - step
-            last = length
+            last, before = length, size
         return None
 
     def tangent(self, solved: Any, border: FloatArray) -> tuple[FloatArray, float] | None:

@@ -60,9 +60,10 @@ class Rounds:
         own, at = taken[i:] + taken[:i], np.concatenate([times[i:], times[:i] + period])
         for engine in (lambda: self.engine, lambda: self.second):
             log = self._run(values, z, int(shooting.modes[i]), begin, begin + period, [], engine())
-            if log is None or (shown := log.crossing_transition.tolist()) == own:
+            if log is None or log.crossing_transition.tolist() == own:
                 return True
-            if self._told(shown, log.crossing_time, period) == self._told(own, at, period):
+            shown = [visit.transition for visit in visits_of(self.flow, values, log, z[len(self.system.states) :])[0]]
+            if shown == own or self._told(shown, log.crossing_time, period) == self._told(own, at, period):
                 return True
         return False
 

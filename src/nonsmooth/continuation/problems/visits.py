@@ -9,6 +9,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
 from nonsmooth.flow.saltation import BEHIND
+from nonsmooth.system.symbolic.traced import ALONE, FOUND
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import TrajectoryLog
@@ -35,7 +36,8 @@ def visits_of(
         else:
             before = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
             same = i > 0 and t == float(log.crossing_time[i - 1])
-            visits.append(Visit(jump.source, k, _fired_row(flow, values, k, t, before, same)))
+            row = _fired_row(flow, values, k, t, before, same)
+            visits.append(Visit(jump.source, *_alone(flow, values, k, row, t, before)))
         memory = log.memory_after[i]
     after = np.concatenate([np.nan_to_num(log.u_after[first:]), log.memory_after[first:]], axis=1)
     return visits, after.reshape(len(visits), flow.n)
@@ -51,6 +53,24 @@ def _fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: F
         if not same and abs(other.h) <= ROUNDING * _size(flow, other, z):
             return row
     return AT_ONCE if same and (found.rate == 0.0 or abs(found.h) > BEHIND * _size(flow, found, z)) else found.row
+
+
+def _alone(flow: VariationalFlow, values: FloatArray, k: int, row: int, t: float, z: FloatArray) -> tuple[int, int]:
+    """The transition, and its row, of the one element that acts: others are asked with it where they only happen to be
+    near, and their answer is the same."""
+    jumps = flow.traced.transitions
+    answer = jumps[k]
+    if answer.kind != FOUND:
+        return k, row
+    found = flow.jump(values, k, t, z, row)
+    for other, jump in enumerate(jumps):
+        if jump.kind == ALONE and (jump.source, jump.target) == (answer.source, answer.target):
+            for i in (i for i, fired in enumerate(jump.rows) if fired in answer.rows):
+                own = flow.jump(values, other, t, z, i)
+                same = (np.abs(own.z_after - found.z_after) < ROUNDING * flow.scale).all()
+                if same and abs(own.h) <= BEHIND * _size(flow, own, z) and np.allclose(own.R, found.R):
+                    return other, i
+    return k, row
 
 
 def _size(flow: VariationalFlow, jump: Jump, z: FloatArray) -> float:
