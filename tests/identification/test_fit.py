@@ -443,6 +443,20 @@ def test_a_near_guess_needs_no_short_windows_and_gives_the_same(monkeypatch):
         assert at_once.uncertainty[name] == pytest.approx(grown.uncertainty[name], rel=1e-3)
 
 
+def test_how_well_windows_fit_is_counted_in_the_noise_of_each_channel():
+    """Off by 2e-5 in x and by 3e-4 in v, whose noise is another: by readings less what is found."""
+    from nonsmooth.identification.fit.first_level import Stage
+    from nonsmooth.identification.fit.growth import _reduced
+
+    t, start, off = np.linspace(0.0, 6.0, 241), np.array([[0.1, 0.2]]), np.array([2e-5, 3e-4])
+    run = ns.simulate(free(), duration=6.0, start=start[0], samples=t)["u"].values
+    data = {name: (t, run[:, i] + off[i]) for i, name in enumerate("xv")}
+    problem = problem_of(free(), data, ["k"], {"measured": ["x", "v"]})
+    stage = Stage(problem.of(first_windows(problem, np.array([K]), np.inf, start, True)), np.array([K]), start)
+    expected = 241 * np.sum((off / problem.noise) ** 2)
+    assert _reduced(stage) == pytest.approx(expected / (2 * 241 - 3), rel=1e-6)  # k and both states of the start
+
+
 def test_a_channel_in_another_unit_is_told_of_unless_its_gain_is_given(recwarn):
     """x = exp(-t / 10) cos(w t) in mm beside a state in m: with a gain of 1000 readings per metre k and c are exact."""
     t = np.linspace(0.0, 20.0, 400)

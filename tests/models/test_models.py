@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+import nonsmooth as ns
 from nonsmooth import models
 
 pytestmark = pytest.mark.physics
@@ -38,6 +39,23 @@ def test_every_model_is_listed_documented_and_takes_parameters():
         assert make(**{first: 2.0}).values[first] == 2.0
         with pytest.raises(ValueError, match="`nonsense` is not a parameter"):
             make(nonsense=1.0)
+
+
+def test_the_smoothed_support_pushes_as_eqs_8_say():
+    """Entering with v_a at x = g - eta, the force grows from 0 to that of contact; leaving it is half of either."""
+    eta, g, k_s, c_s = 1e-3, -0.0045, 1210.0, 0.60
+    system = models.discontinuous_support().smoothed(eta)
+    run = ns.simulate(system, duration=0.15, start={"x": g - 1.5 * eta, "v": 0.1}, samples=1501)
+    x, v = run["u"].values.T
+    mode = np.array(system.modes)[run["mode"].values]
+    q, v_a = (x - g + eta) / (2 * eta), run["u_before"].values[0, 1]
+    entering = -k_s / 2 * (x - g + eta) - c_s * v + c_s * v_a * (1 - q)
+    leaving = -k_s / 2 * (x - g + eta) - c_s / 2 * v
+    expected = {"free": 0 * x, "penetration_band": entering, "contact": -k_s * (x - g) - c_s * v}
+    for name, force in (expected | {"separation_band": leaving}).items():
+        at = mode == name
+        assert at.sum() > 10
+        np.testing.assert_allclose(run["contact_force"].values[at], force[at], atol=1e-9)
 
 
 def test_the_paper_s_table_1_and_natural_frequency():

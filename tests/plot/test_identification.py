@@ -253,6 +253,7 @@ def test_a_fit_is_drawn_over_time_and_by_place() -> None:
     bars = identification.fit_residuals(fitted_motion(), show="places")
     assert [label.get_text() for label in bars.get_yticklabels()] == ["free", "contact", "hit"]
     assert bars.patches[0].get_width() == pytest.approx(np.sqrt(0.5), rel=0.1)  # rms of a cosine
+    assert [list(line.get_xdata()) for line in bars.lines if len(line.get_xdata()) == 2] == [[1.0, 1.0]]  # one sigma
     with pytest.raises(ValueError, match="allowed: 'time', 'places'"):
         identification.fit_residuals(fitted_motion(), show="phase")
 

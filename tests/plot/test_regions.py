@@ -61,6 +61,15 @@ def test_the_bands_are_those_of_the_paper(support: System) -> None:
         assert colour_at(ax, x, v) == name, (x, v)
 
 
+def test_over_a_longer_motion_the_part_that_was_asked_for_is_shown(support: System) -> None:
+    ax = plot.regions(support, **WINDOW)
+    ax.clear()
+    (motion,) = ax.plot([-1.0, 1.0], [-1.0, 1.0])
+    plot.regions(support, ax, **WINDOW)
+    assert (ax.get_xlim(), ax.get_ylim()) == (WINDOW["xlim"], WINDOW["ylim"])
+    motion.remove()
+
+
 def test_what_cannot_be_drawn_is_explained(support: System) -> None:
     with pytest.raises(ValueError, match="'w' is not a state; states:"):
         plot.regions(support, y="w", **WINDOW)

@@ -412,6 +412,9 @@ def test_a_system_is_printed_with_its_elements_as_they_were_given() -> None:
     assert "v_q' = -q - 0.1*v_q" in lines and len(lines) < 14
     assert "->" not in str(rig) and "->" in rig.summary(verbose=True)
     assert "indicator s_gap" in rig.summary(verbose=True) and "s_gap" not in rig.summary()
+    every = rig.summary(verbose=True).splitlines()
+    shown = [line.split()[1].rstrip(":") for line in every if line.startswith("  mode ")]
+    assert sorted(shown) == sorted(rig.written_out().modes)
     ball = shaken()
     assert 'stop: Stop(gap=d - x, on={"v": -1.0}, restitution="e")' in str(ball)
     assert str(ns.System.from_text(ball.to_text())) == str(ball)

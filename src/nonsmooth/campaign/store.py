@@ -254,14 +254,8 @@ def _create(group: Any, work: ChunkedWork, places: int, chunk: int) -> None:
     from zarr.codecs import ZstdCodec
 
     for name, item in work.columns().items():
-        group.create_array(
-            name,
-            shape=(places, *item.shape),
-            chunks=(chunk, *item.shape),
-            dtype=item.dtype,
-            compressors=ZstdCodec(level=LEVEL),
-            config={"write_empty_chunks": True},
-        )
+        shape, chunks, compressors = (places, *item.shape), (chunk, *item.shape), ZstdCodec(level=LEVEL)
+        group.create_array(name, shape=shape, chunks=chunks, dtype=item.dtype, compressors=compressors)
 
 
 def _put(group: Any, arrays: Mapping[str, NDArray[Any]], first: int, last: int) -> None:

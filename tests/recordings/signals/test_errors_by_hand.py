@@ -33,6 +33,27 @@ def test_a_section_point_within_the_step_of_an_impact() -> None:
     assert found["section"].values == pytest.approx(ball(at), abs=1e-12)
 
 
+def test_without_accelerations_each_side_of_an_impact_is_continued_straight() -> None:
+    """A puck comes with 1.5 and leaves with -0.5 at t = 0.33, between two samples: straight on either side."""
+    t, at = np.arange(0.30, 0.37, 0.02), np.array([0.324, 0.3295, 0.3301, 0.338])
+
+    def puck(t: Any) -> Any:
+        speed = np.where(t < 0.33, 1.5, -0.5)
+        return np.column_stack([speed * (t - 0.33), speed])
+
+    phase = DrivePhase(2 * np.pi, 0.0, 0.0, 0.0, 0.0, "fit", at, np.arange(4), (0.3, 0.36))
+    found = stroboscopic(t, *puck(t).T, phase, impacts=[0.33])
+    assert found["section"].values == pytest.approx(puck(at), abs=1e-12)
+
+
+def test_the_error_of_v_on_a_surface_of_x_needs_none_of_x() -> None:
+    """x = t passes 1.5; how far off v is does not hang on the instant, which nobody knows."""
+    t = np.arange(4.0)
+    found = poincare(t, t - 1.5, np.ones(4), v_error=np.full(4, 0.03))
+    assert found["section_error"].values[0] == pytest.approx([0.0, 0.03])
+    assert np.isnan(found["time_error"].values).all()
+
+
 def test_between_two_samples_the_larger_error_holds() -> None:
     """x = t passes 0.5 between a good and a bad sample: whichever comes first, the error is the bad one's."""
     t = np.arange(4.0)

@@ -204,8 +204,8 @@ def _joined(stage: Stage, length: float) -> list[Window]:
 
 def _reduced(stage: Stage) -> float:
     """Sum of squared residuals over the noise, per degree of freedom."""
-    rows = [r / stage.problem.noise[w.readings[1]] for w, r in stage.problem.rows(stage.state)]
-    return sum(float(r @ r) for r in rows) / _freedom(stage.problem)[0]
+    counts = [len(window.readings[0]) for window in stage.problem.pieces]
+    return float(stage.misfits @ counts) / _freedom(stage.problem)[0]
 
 
 def _freedom(problem: Windows) -> tuple[float, int]:
