@@ -16,7 +16,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.system.arguments import declared
-from nonsmooth.system.kinds import Limit
+from nonsmooth.system.kinds import Limit, reader_of
 
 #: Verbs whose arguments are read by themselves: they take any names, or what is no option.
 OTHERS = {"animate", "explore", "identify", "load", "load_recording", "save", "system_of", "where"}
@@ -143,3 +143,10 @@ def test_no_verb_has_more_than_twelve_arguments_of_its_own_or_120_lines() -> Non
 def test_the_ends_of_limits_are_allowed_but_for_one_that_says_above() -> None:
     assert [Limit(0, 2).holds(x) for x in (-0.1, 0, 2, 2.1)] == [False, True, True, False]
     assert [Limit(0, 2, without_low=True).holds(x) for x in (0, 0.1, 2, 2.1)] == [False, True, True, False]
+
+
+def test_a_number_may_be_as_large_as_it_is_and_a_count_as_large_as_it_is_exact() -> None:
+    number, count = reader_of(float), reader_of(int)
+    assert number(-1e300, "x") == -1e300 and count(-(2**53), "n") == -(2**53)
+    with pytest.raises(ValueError, match="n = -9007199254740994"):
+        count(-(2**53) - 2, "n")

@@ -124,3 +124,12 @@ def test_what_is_refused() -> None:
         ns.bifurcation_diagram(ns.models.relief_valve(q=9.0), "q", (5.0, 10.0))
     with pytest.raises(ns.SolveError, match=r"the budget of 1e-09 s was spent before"):
         ns.bifurcation_diagram(support(rho=0.14, g=0.02), "omega", (3.0, 7.0), budget=1e-9, n=5, progress=False)
+
+
+def test_a_bubble_of_period_doubling_is_one_branch_from_flip_to_flip() -> None:
+    """x' = a - x^2 has period 2 where a > 3/4 and period 4 from 5/4 on: with a = 1 - mu^2 from mu = -1/2 to 1/2."""
+    hump = ns.Map(states=["x"], parameters={"mu": 0.0}, branches=[ns.Branch(lambda u, p: (1.0 - p.mu**2 - u.x**2,))])
+    found = ns.bifurcation_diagram(hump, "mu", (-0.9, 0.8), n=21, transient=50, progress=False)
+    assert found["period_number"].values.tolist() == [1, 2]
+    assert found["special_kind"].values.tolist() == ["flip"] * 4
+    assert sorted(found["special_value"].values) == pytest.approx([-0.5, -0.5, 0.5, 0.5], abs=1e-9)

@@ -119,3 +119,14 @@ def test_ctrl_c_is_heard_while_the_pairs_of_many_points_are_counted() -> None:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
+
+
+def test_how_steady_a_slope_is_hangs_on_its_own_size() -> None:
+    """A tenth of all slopes (dimensions below one) has the same steady part, the longer one: from 1e-4 on."""
+    from nonsmooth.diagrams.correlation_dimension import SPREAD, _range
+
+    radius = 10 ** np.linspace(-6, 0, 200)
+    slope = np.where(radius < 1e-4, 1.5, 1.0) * (1 + 0.02 * (-1.0) ** np.arange(200))
+    ranges = [_range(radius, size * slope, np.full(200, 1e9), 1e9) for size in (1.0, 0.1)]
+    assert 0.02 < SPREAD < 0.2
+    assert ranges[0] == ranges[1] and min(ranges[0]) == pytest.approx(1e-4, rel=0.2)

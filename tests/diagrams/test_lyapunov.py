@@ -483,6 +483,19 @@ def test_what_contacts_hold_is_no_exponent() -> None:
     assert ns.lyapunov(alone, duration=50.0, start={"q": 0.2})["exponents"].values == pytest.approx([0.0, -np.inf])
 
 
+def test_what_friction_holds_is_no_exponent_beside_a_memory_that_nobody_wrote() -> None:
+    """A stuck mass: its place is free (0), its speed lost (-inf); y' = -0.3 y goes on beside it."""
+    system = ns.System(
+        states=["x", "v", "y"],
+        parameters={"w": 1.0},
+        modes={"only": lambda t, u, p: (u.v, 0.1 * np.cos(p.w * t) - u.x - 0.2 * u.v, -0.3 * u.y)},
+        memory={"never": (0.5, "")},
+        elements={"rub": Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction=5.0)},
+    )
+    found = ns.lyapunov(system, periods=50, transient=5, start={"x": 0.1, "y": 1.0}, progress=False)
+    assert found["exponents"].values[:3] == pytest.approx([0.0, -0.3, -np.inf], abs=1e-12)
+
+
 @pytest.mark.parametrize(("restitution", "rubs"), [(0.0, {}), (0.3, {}), (0.6, {"f": Coulomb(at="q", friction=0.1)})])
 @pytest.mark.parametrize("method", ["exact", "taylor"])
 def test_a_chatter_that_ends_in_rest_loses_place_and_speed(restitution: float, rubs: Any, method: str) -> None:

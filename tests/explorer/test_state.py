@@ -106,3 +106,15 @@ def test_an_image_has_a_pixel_per_column_and_shows_density() -> None:
     assert image[0, 0] & 0xFFFFFF == 0xB27200  # bytes R, G, B, A
     over = drawn([(points, "#0072B2", 1), (points, "#D55E00", 1)], 0.0, 1.0, 10)
     assert over[0, 0] & 0xFFFFFF == 0x005ED5
+
+
+def test_the_range_of_a_response_lies_about_the_value_whatever_sign_the_models_own_has() -> None:
+    from nonsmooth.explorer.kinds import setting
+
+    state = replace(FIRST.with_value("g", 2.0), settings={"response.over": "g"})
+    ranges = [
+        [setting(f"response.{end}", SYSTEM.with_parameters(g=own), state) for end in ("low", "high")]
+        for own in (2.0, 0.0, -3.0)
+    ]
+    np.testing.assert_allclose(ranges[1:], [ranges[0]] * 2, rtol=1e-12)
+    assert ranges[0][0] < 2.0 < ranges[0][1]

@@ -370,3 +370,19 @@ def test_five_transitions_of_one_instant_are_taken_by_every_method(method: str) 
     np.testing.assert_allclose(run.crossing_time, 0.5, atol=1e-12)
     assert run.crossing_transition.values.tolist() == [0, 1, 1, 1, 1]
     np.testing.assert_allclose(run.u.values[-1, 0], -0.1 + 0.05, atol=1e-12)
+
+
+def test_a_run_behind_a_transient_has_as_many_samples_as_one_without() -> None:
+    """Whole periods are sampled at the same phases, whatever the rounding of the times they begin and end at."""
+    system = ns.models.discontinuous_support(g=1.0)
+    sizes = [ns.simulate(system, periods=3, transient=wait).sizes["time"] for wait in (0, 7, 1000)]
+    assert sizes[0] == sizes[1] == sizes[2] and (sizes[0] - 1) % 3 == 0
+
+
+@pytest.mark.parametrize("method", ["taylor", "rkf45"])
+def test_a_method_that_is_asked_for_is_the_one_that_runs(method: str) -> None:
+    """x = cos t: at a tolerance of 1e-4 a series errs, and the exact flow would not."""
+    mass = ns.mechanical(1.0, 0.0, 1.0, coordinates=["x"])
+    run = ns.simulate(mass, duration=20.0, start={"x": 1.0}, samples=101, method=method, rtol=1e-4)
+    error = np.abs(run["u"].sel(state="x").values - np.cos(run["time"].values)).max()
+    assert 1e-9 < error < 1e-2

@@ -182,7 +182,8 @@ def run_length(
 def _instants(samples: Any, t_begin: float, t_end: float, period: float | None, width: int) -> FloatArray:
     """The instants that are recorded, each with ``width`` numbers."""
     if samples is None:
-        samples = SAMPLES + 1 if period is None else np.ceil((t_end - t_begin) / period * SAMPLES_PER_PERIOD) + 1
+        steps = SAMPLES if period is None else (t_end - t_begin) / period * SAMPLES_PER_PERIOD
+        samples = max(np.ceil(steps - 1e-6), 1) + 1  # behind a transient whole periods are whole up to rounding
     if np.ndim(samples) == 0:
         n = real_number(samples, "samples")
         room_for(8.0 * n * width, f"a run with {n:.6g} samples", "give samples=, a number of instants or the instants")

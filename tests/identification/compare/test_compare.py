@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -247,3 +248,33 @@ def test_a_table_of_amplitudes_is_a_response() -> None:
         assert found["measured_omega"].values.tolist() == [3.1, 4.0, 2.0, 2.6]
     with pytest.raises(ValueError, match="one number of each kind"):
         compare({**table, "amplitude": [1.0]}, system)
+
+
+@pytest.mark.parametrize("well", [1.0, -1.0])
+def test_of_two_motions_the_one_nearest_to_the_measurement_is_taken(well: float) -> None:
+    """x'' + 0.2 x' + x -+ 1 = 0.1 cos 2t: about +-1 swings the real part of 0.1 exp(2it) / (1 - 4 + 0.4 i)."""
+
+    def about(place: float) -> Any:
+        return lambda t, u, p: (u.v, 0.1 * np.cos(2.0 * t) - (u.x - place) - p.c * u.v)
+
+    system = ns.System(
+        states={"x": "m", "v": "m/s"},
+        parameters={"c": 0.2},
+        modes={"left": about(-1.0), "right": about(1.0)},
+        indicators={"side": lambda t, u, p: u.x},
+        transitions=[ns.Transition("left", "right", when="side > 0"), ns.Transition("right", "left", when="side < 0")],
+    )
+    t, size = 0.01 + np.arange(0, 160.0, 0.05), np.array([1e-3, 1e-3])
+    swing = 0.1 / (1 - 4 + 0.4j) * np.exp(2j * t)
+    noise = size * np.random.default_rng(1).normal(size=(len(t), 2))
+    u = np.column_stack([well + swing.real, (2j * swing).real]) + noise
+    measured = xr.Dataset(
+        {"u": (("time", "state"), u), "u_error": (("time", "state"), u * 0 + size), "phase": ("time", t / np.pi)},
+        {"time": t, "state": ["x", "v"], "state_unit": ("state", ["m", "m/s"])},
+    )
+    known = Known(c=(0.2, 1e-9))
+    found = compare(measured, system, parameters=known, start=[[1.0, 0.0], [-1.0, 0.0]], transient=100, draws=3)
+    assert found["theory_orbit"].sel(state="x").mean().item() == pytest.approx(well, abs=1e-6)
+    assert float(found["orbit_distance"]) < 5e-3
+    # A drawn point without the noise of the measured ones would be at 0.86 of their spread (a normal law in the plane).
+    assert float(found["draw_energy_distance"].max()) < 0.4
