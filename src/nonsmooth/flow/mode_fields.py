@@ -15,7 +15,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.system.derived.patterns import STEP
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.patterns import Patterns
     from nonsmooth.system.derived.rows import Rows
     from nonsmooth.system.symbolic.traced import Traced
 
@@ -113,16 +112,16 @@ class _Numbers(ModeField):
     def indicators(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        rows, _, _ = self.patterns.ways_out(_rows(self.patterns, values.tobytes()), self.pattern)
+        rows, _, _ = self.patterns.ways_out(self.patterns.rows_at(values), self.pattern)
         rows = np.nan_to_num(rows)  # NaN: not asked for
         slopes = np.broadcast_to(rows[:, : len(u)], (*np.shape(t), len(rows), len(u)))
         return self._augmented(u, values, t) @ rows.T, slopes
 
     def _field(self, values: FloatArray, place: int | None = None) -> FloatArray:
-        return _rows(self.patterns, values.tobytes(), place).flow(self.patterns.mode, self.pattern)[0]
+        return self.patterns.rows_at(values, place).flow(self.patterns.mode, self.pattern)[0]
 
     def _augmented(self, u: FloatArray, values: FloatArray, t: Any) -> FloatArray:
-        rows, times = _rows(self.patterns, values.tobytes()), np.atleast_1d(t)
+        rows, times = self.patterns.rows_at(values), np.atleast_1d(t)
         w = rows.augmented_all(np.tile(u, (len(times), 1)), times)
         return w if np.ndim(t) else w[0]
 
@@ -141,7 +140,7 @@ def every_mode(traced: Traced, values: FloatArray) -> range | None:
     make, counts = patterns.make, [len(part.element.phases) for part in patterns.make.parts]
     if prod(counts) > MOST:
         return None
-    rows = _rows(patterns, values.tobytes())
+    rows = patterns.rows_at(values)
     for pattern in sorted({*product(*map(range, counts))} - patterns.led):
         if make.may_hold(make.held(pattern), patterns.mode):
             patterns.look_at(rows, pattern)
@@ -154,15 +153,9 @@ def held_places(traced: Traced, mode: int, values: FloatArray) -> tuple[Rows, li
     if patterns is None:
         return None
     pattern = patterns.visited[mode] if traced.decider is None else traced.decider.modes[mode][1]
-    rows = _rows(patterns, values.tobytes())
+    rows = patterns.rows_at(values)
     held = rows.held(pattern)
     return rows, [np.array([rows.parts[k].where.values, rows.rate(k, patterns.mode).values]) for k in held]
-
-
-@lru_cache(maxsize=16)
-def _rows(patterns: Patterns, values: bytes, place: int | None = None) -> Rows:
-    """The calculus of a system's elements at values of the parameters."""
-    return patterns.rows_at(np.frombuffer(values), place)
 
 
 def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:

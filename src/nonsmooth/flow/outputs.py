@@ -50,7 +50,7 @@ def _shared(
     """The forces of elements (N, elements), those that are not unique within their bounds."""
     from sympy import lambdify
 
-    rows = None if decider.rows is None else decider.rows.rows(decider.rows.form.evaluate(parameters[None, :]), 0)
+    rows = None if decider.rows is None else decider.rows.rows_at(parameters)
     for m in np.unique(mode):
         here = np.flatnonzero(mode == m)
 

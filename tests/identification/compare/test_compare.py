@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -278,3 +279,30 @@ def test_of_two_motions_the_one_nearest_to_the_measurement_is_taken(well: float)
     assert float(found["orbit_distance"]) < 5e-3
     # A drawn point without the noise of the measured ones would be at 0.86 of their spread (a normal law in the plane).
     assert float(found["draw_energy_distance"].max()) < 0.4
+
+
+@pytest.mark.parametrize(("what", "theirs", "ours"), [("x", "mm", "m"), ("w", "Hz", "rad/s")])
+def test_a_unit_that_differs_is_said(what: str, theirs: str, ours: str) -> None:
+    """Nothing is converted: an amplitude in mm, or a frequency in Hz, is compared and fitted as it stands, and a
+    warning says so; of a response in the model's own units there is none. The response is that in closed form."""
+    system = ns.mechanical(
+        1.0,
+        lambda p: p.c,
+        9.0,
+        parameters={"c": (0.15, "kg/s"), "w": (2.0, "rad/s")},
+        coordinates={"x": "m"},
+        forcing={"x": lambda t, p: np.cos(p.w * t)},
+    )
+    w = np.array([2.0, 2.6, 3.1, 4.0])
+    runs = {"amplitude": ("run", 1 / np.hypot(9 - w**2, 0.15 * w)), "w": ("run", w, {"units": "rad/s"})}
+    measured = xr.Dataset(runs, {"state": ["x"]})
+    measured = measured.assign(amplitude=measured["amplitude"].expand_dims("state", -1).assign_attrs(units="m"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        assert np.abs(compare(measured, system, parameter="w")["relative_difference"]).max() < 1e-9
+    measured["amplitude" if what == "x" else what].attrs["units"] = theirs
+    said = f"measured '{what}' is in {theirs}, the model in {ours}, and numbers are compared as they are"
+    with pytest.warns(UserWarning, match=said):
+        compare(measured, system, parameter="w")
+    with pytest.warns(UserWarning, match=said):
+        assert ns.fit(system, measured, ["c"], measured="x")["c"] == pytest.approx(0.15, rel=1e-6)

@@ -23,6 +23,7 @@ FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
 ROUNDED = 1e-10  # residual: one that is smaller, and not half of that before, is rounding
+ROUNDING = 1e-14  # residual: no guess has a smaller one by chance
 AGAIN = 1e-7  # in scaled unknowns: as near as a branch comes back to a point of its own, both solved
 STEP = 1e-5  # of differences, in scaled unknowns
 #: The word of a curve (of orbits: the signature), the unknowns, and what other curves of the branch have of them.
@@ -198,7 +199,8 @@ class Curve(ABC, Generic[P]):
                 except np.linalg.LinAlgError:
                     return None
             length, size = float(np.abs(step).max()), float(np.abs(right).max())
-            rounded = 0.5 * before < size < ROUNDED  # beside impacts that all but vanish it makes steps of 1e-9
+            # Beside impacts that all but vanish it makes steps of 1e-9; the square of a longer step is no rounding.
+            rounded = 0.5 * before < size < (ROUNDED if 100 * last * last < size else ROUNDING)
             if not length < self.longest or (i > 1 and length > self.grows * last and length > 1e-10 and not rounded):
                 return None
             # Beside a square root the slopes are so steep that steps are small far from the solution: there they grow,

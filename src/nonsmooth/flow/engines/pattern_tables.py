@@ -47,7 +47,7 @@ class PatternTables:
         from nonsmooth.kernels.compile.assembly import linear_module
 
         self.patterns = patterns
-        self.rows = patterns.rows(tables.linear, i)
+        self.rows = patterns.rows_at(tables.points[i])
         n, width = self.rows.field.shape
         self.harmonics = (width - n - 1) // 2
         self.stand = linear_module().stand

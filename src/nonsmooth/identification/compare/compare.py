@@ -14,6 +14,7 @@ from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.fit.steady import is_steady, of_table
+from nonsmooth.identification.measured_units import compare_units_of_readings, units_of
 from nonsmooth.identification.options import Comparing
 from nonsmooth.results.labels import labelled, labels_of
 from nonsmooth.system.arguments import checked
@@ -147,6 +148,7 @@ def compare(
             here, told = nominal(theory, parameters, set_), getattr(parameters, "extra", {})
             measured = recorded_motion(measured, here, channels, run, told)
     kind, states = _kind(measured, parameter), _states(measured, theory)
+    compare_units_of_readings(measured, units_of(theory))
     spread = np.full(len(states), np.nan) if kind == "response" else _noise(measured, noise, states)
     solver = solver_of(options)
     rest: dict[str, Any] = {key: value for key, value in options.items() if key not in solver}
@@ -165,7 +167,7 @@ def compare(
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
 
-        own = _state_units(model)[states[0]]
+        own = units_of(theory)[states[0]]
         variables = compare_response(measured, model, name=name, state=states[0], own=own)
     elif kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
@@ -239,13 +241,6 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
     return values
 
 
-def _state_units(model: Model) -> dict[str, str]:
-    """The units of the theory's states."""
-    if model.system is not None:
-        return dict(model.system.states)
-    return dict(zip(model.theory["state"].values.tolist(), model.theory["state_unit"].values.tolist(), strict=True))
-
-
 def _swept(measured: xr.Dataset) -> str:
     others = [str(dim) for dim in measured["section"].dims if dim not in ("iterate", "state")]
     if len(others) != 1:
@@ -274,7 +269,7 @@ def _dataset(
         record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=model.seed)))
         own = {name: labelled((), float(q.value or 0.0), name, q.unit) for name, q in labels.parameters.items()}
         variables = own | variables
-    units = _state_units(model)
+    units = units_of(theory)
     record["measured"] = {key: str(value) for key, value in measured.attrs.items() if key != ATTRIBUTE}
     coords = {
         "state": labelled("state", np.array(model.states), "state"),

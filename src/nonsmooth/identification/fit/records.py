@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -15,12 +14,11 @@ from nonsmooth.errors import check_keys, shortened, unknown
 from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_steady
+from nonsmooth.identification.measured_units import compare_units
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.kinds import float_array, real_number
 from nonsmooth.system.system import System
-from nonsmooth.system.units import power_between, read_unit
 
-CALIBRATES = 5.0  # a gain farther than this factor from that of two units is none of a calibration
 FORMS = (
     "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "
     "to (t, y), or a list of these"
@@ -120,22 +118,9 @@ def _units(recording: Any) -> dict[str, str]:
 def _compare_units(
     what: str, channel: str, units: Sequence[Mapping[str, str]], ours: str, remedy: str, gain: float = 1.0
 ) -> None:
-    """Warn where model and channel, in any of the recordings, are in units that are known, and differ by another factor
-    than the gain. Beside units of other things any gain but 1 is one."""
+    """Compare the unit of a channel in any of the recordings."""
     for theirs in dict.fromkeys(one.get(channel, "") for one in units):
-        one, other = read_unit(theirs), read_unit(ours)
-        if one is None or other is None:
-            continue
-        power = power_between(ours, theirs)
-        if one != other and gain == 1.0:
-            said = "numbers are compared as they are"
-        elif power is not None and not 1 / CALIBRATES < abs(gain) / 10.0**power < CALIBRATES:
-            said = f"that is {10.0**power:g} of the former to one of the latter, and the gain is {gain:.6g}"
-        else:
-            continue
-        warnings.warn(
-            f"{what}: channel {channel!r} is in {theirs}, the model in {ours}, and {said}; give {remedy}", stacklevel=4
-        )
+        compare_units(f"{what}: channel {channel!r}", theirs, ours, remedy, gain)
 
 
 def _driven(

@@ -23,6 +23,7 @@ from nonsmooth.errors import unknown
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
+from nonsmooth.identification.measured_units import compare_units_of_readings, units_of
 from nonsmooth.system.kinds import float_array
 from nonsmooth.system.system import System
 
@@ -130,6 +131,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
     set_ = [key for key in system.values if key in one.variables and {*one[key].dims} & {*over}]
     extra = [each for each in (f"{kind}_error", "period_number") if each in one]
     frame = one[[kind, *extra, *set_]].to_dataframe().reset_index()
+    compare_units_of_readings(one, units_of(system))
     if not set_:
         raise ValueError(
             f"run {name!r} does not say at which values of a parameter its {kind} was read: give them under the "

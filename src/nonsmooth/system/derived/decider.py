@@ -154,7 +154,7 @@ class Decider:
                 step,
                 self.known().fields[mode],
             )
-        rows = self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
+        rows = self.rows.rows_at(values)
         return lambda mode, time, u, memory, step: RowNumbers(
             rows, rows.mode, rows.augmented(u, time), step, self.modes[mode][1]
         )

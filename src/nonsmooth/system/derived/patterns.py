@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
@@ -26,10 +27,11 @@ from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Trace
 from nonsmooth.system.symbolic.tracing import call_scalar
 
 if TYPE_CHECKING:
-    from nonsmooth.system.codegen.linear import LinearForm, LinearTables
+    from nonsmooth.system.codegen.linear import LinearForm
     from nonsmooth.system.derived.elements.element import Leaving
     from nonsmooth.system.derived.expressions import Expressions
 
+KEPT = 8  # parameter points, and derivatives there, whose numbers are kept by a thread
 STEP = 1e-30  # of the imaginary parts that carry derivatives: its square is nothing
 
 Conditions = tuple[TracedCondition, ...]
@@ -93,8 +95,9 @@ class Patterns:
                 self._keep((k, "on", i), part.direction[i])
             for name, side in part.element.needs(set(self.elements)):
                 self._keep((k, name, side), self.make.law(k, name, side))
-        self._lock = threading.Lock()
+        self._lock, self._local = threading.Lock(), threading.local()
         self._known: dict[Pattern, int] = {}
+        self._groups: dict[bytes, list[list[int]]] = {}
         self._jumped: dict[Lead, int] = {}
         self._seen: tuple[tuple[int, int], Any] = (0, 0), None
         self.number((0,) * len(self.make.parts))
@@ -196,6 +199,17 @@ class Patterns:
         together = Lead(pattern, pattern, "", tuple(dict.fromkeys(meets)), TOGETHER)
         return conditions, [*found, together], [*states, None], [slot for slot, _, _ in meets]
 
+    def grouped(self, changes: NDArray[np.bool_]) -> list[list[int]]:
+        """The elements apart by which of them changes the rates of which, and which names which."""
+        key = changes.tobytes()
+        if key not in self._groups:
+            from scipy.sparse.csgraph import connected_components
+
+            names = [[name in vars(element).values() for name in self.elements] for element in self.elements.values()]
+            number, labels = connected_components(changes | np.array(names), directed=False)
+            self._groups[key] = [np.flatnonzero(labels == g).tolist() for g in range(number)]
+        return self._groups[key]
+
     def look_at(self, rows: Rows, pattern: Pattern) -> None:
         """Give all ways out of a pattern their numbers."""
         for lead in self.leads_of(rows, pattern)[1]:
@@ -256,14 +270,19 @@ class Patterns:
             )
         return form
 
-    def rows(self, tables: LinearTables, i: int) -> Rows:
-        """The calculus at one parameter point."""
-        return Rows(self, tables, i)
-
     def rows_at(self, values: FloatArray, place: int | None = None) -> Rows:
         """The calculus at given parameters; with a parameter's ``place`` that of numbers whose imaginary parts are
-        ``STEP`` times their derivatives in it."""
-        point = values[None, :]
+        ``STEP`` times their derivatives in it. A thread keeps those of the last few."""
+        kept: dict[tuple[bytes, int | None], Rows] = self._local.__dict__.setdefault("rows", {})
+        key = values.tobytes(), place
+        if key not in kept:
+            found = self._made(values[None, :], place)
+            while len(kept) >= KEPT:
+                del kept[next(iter(kept))]
+            kept[key] = found
+        return kept[key]
+
+    def _made(self, point: FloatArray, place: int | None) -> Rows:
         tables = self.form.evaluate(point)
         if place is None:
             return Rows(self, tables, 0)

@@ -91,7 +91,7 @@ class Rows(Assembler):
         put_together(self.field, self.n, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
         every = np.zeros((len(tables.ib[i]), self.field.shape[1]), dtype=self.field.dtype)
         put_together(every, self.n, tables.ia[i], tables.ib[i], tables.ic[i], tables.is_[i])
-        self._every, self._at = every, patterns.at
+        self._every, self._at, self._grouped = every, patterns.at, patterns.grouped
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
         self.ways: dict[tuple[int, Any], Any] = {}  # out of its phase, of each element in a combination of its group
@@ -239,16 +239,12 @@ class Rows(Assembler):
     def groups(self) -> list[tuple[list[int], Callable[[Pattern], Any], Any]]:
         """The elements apart by whose forces change whose rates: what one does depends on the phases of its group
         alone. Of each group the elements, what takes their phases from a pattern, and the states that they act on."""
-        from scipy.sparse.csgraph import connected_components
-
         acts = np.array([part.direction != 0.0 for part in self.parts])
         felt = acts.copy()
         for k, part in enumerate(self.parts):
             if part.element.held:
                 felt[k] |= self.rate(k, self.mode).values[: self.n] != 0.0
-        speaks = np.array([[other.name in vars(part.element).values() for other in self.parts] for part in self.parts])
-        number, labels = connected_components(felt @ acts.T | speaks, directed=False)
-        groups = [np.flatnonzero(labels == g).tolist() for g in range(number)]
+        groups = self._grouped(felt @ acts.T)
         return [(some, itemgetter(*some), np.flatnonzero(acts[some].any(axis=0))) for some in groups]
 
     @cached_property
