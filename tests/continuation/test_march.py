@@ -288,3 +288,14 @@ def test_nothing_lands_at_the_section() -> None:
         path = curve.walk.along(curve.shooting.evaluate(X), curve.shooting.split(X)[1].copy())
         found.append(path.margins[1:])
     assert np.isfinite(found[0]).all() and found[1] == pytest.approx(found[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("start", [-9e-7, -1.05e-6, 3e-5])
+def test_a_residual_that_the_last_step_s_square_leaves_is_no_rounding(start: float) -> None:
+    """x (x + 2 p) = 0 beside the crossing of its branches, at p = 1e-6: a first step of 5e-6 from between the roots 0
+    and -2e-6 takes a residual of 1e-12 to 2e-11; the corrector goes on, to a root."""
+    curve = Plane(lambda x, p: (x * (x + 2 * p), 2 * (x + p), 2 * x))
+    found = curve.correct(np.array([start, 1e-6]) / curve.scale, np.array([0.0, 1.0]), 2e-6)
+    assert found is not None
+    x, p = found[0].X
+    assert min(abs(x), abs(x + 2 * p)) < 1e-12
