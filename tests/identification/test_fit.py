@@ -463,7 +463,7 @@ def test_a_channel_in_another_unit_is_told_of_unless_its_gain_is_given(recwarn):
     w = np.sqrt(4.0 - 0.01)
     x = xr.Dataset({"disp": ("time", 5.0 * np.exp(-t / 10) * np.cos(w * t), {"units": "mm"})}, coords={"time": t})
     mass = ns.mechanical(1.0, "c", "k", coordinates={"x": "m"}, parameters={"c": 0.15, "k": 4.2})
-    with pytest.warns(UserWarning, match="channel 'disp' is in mm, the model in m"):
+    with pytest.warns(UserWarning, match="channel 'disp' is in mm, the model in m, and numbers are compared as"):
         problem_of(mass, x, ["c", "k"], {"measured": {"x": "disp"}})
     metres = (x / 1e3).assign(disp=("time", x["disp"].values / 1e3, {"units": "m"}))
     with pytest.warns(UserWarning, match="channel 'disp' is in mm, the model in m"):  # one of several recordings
