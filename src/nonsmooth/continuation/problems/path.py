@@ -112,8 +112,8 @@ class Walk:
                 self.elsewhere[i, k] = False
                 self.elsewhere[i, k:] &= ~np.array(taken, dtype=bool)
             if traced.asks and r >= 0:  # what several decide fires with what one does, of its own or of their condition
-                fired = traced.indicators[self.net.rows[r, 0]]
-                self.elsewhere[i] &= [all(traced.indicators[one.indicator] != fired for one in j.rows) for j in jumps]
+                fired = [one == traced.indicators[self.net.rows[r, 0]] for one in traced.indicators]
+                self.elsewhere[i] &= [not any(fired[one.indicator] for one in j.rows) for j in jumps]
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
         self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
         fixed = [shooting.forced]

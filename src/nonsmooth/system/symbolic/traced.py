@@ -135,19 +135,14 @@ class Traced:
             return self, tuple(range(len(self.transitions)))
         kept: list[TracedTransition] = []
         stands: list[int] = []
+        known: dict[tuple[object, ...], int] = {}
         for jump in self.transitions:
-            same = (jump.source, jump.rows)
-            like = (
-                [
-                    k
-                    for k, one in enumerate(kept)
-                    if one.reset == jump.reset and not one.writes and (not rows or (one.source, one.rows) == same)
-                ]
-                if jump.kind == FOUND
-                else []
-            )
-            stands.append(like[0] if like else len(kept))
-            if not like:
+            key = (jump.reset, *((jump.source, jump.rows) if rows else ()))
+            like = known.get(key) if jump.kind == FOUND else None
+            stands.append(len(kept) if like is None else like)
+            if like is None:
+                if not jump.writes:
+                    known.setdefault(key, len(kept))
                 kept.append(jump)
         return replace(self, transitions=tuple(kept)), tuple(stands)
 
