@@ -186,3 +186,19 @@ def test_an_orbit_with_memory_has_its_own_extremes_and_clearance() -> None:
     assert orbit.maximum == pytest.approx([highest, np.tan(0.75)], abs=1e-12)
     assert orbit.minimum == pytest.approx([-highest, -np.tan(0.75)], abs=1e-12)
     assert orbit.clearance["level"] == pytest.approx(1.0 - highest, abs=1e-12)
+
+
+@pytest.mark.parametrize(("own", "other"), [(0.5, 1.5), (1.0, 0.3), (2.0, -1.0)])
+def test_of_two_branches_that_cross_the_other_one_leaves_whatever_their_angle(own: float, other: float) -> None:
+    """u -> u - (u - 2 - own r) (u - 2 - other r) / 8: two lines of fixed points that cross at r = 0, both ways on."""
+    system = ns.Map(
+        states=["x"],
+        parameters={"r": -0.5},
+        branches=[ns.Branch(lambda u, p: (u.x - 0.125 * (u.x - 2 - own * p.r) * (u.x - 2 - other * p.r),))],
+    )
+    first = ns.find_orbit(system, start={"x": 2 - 0.5 * own}, transient=0)
+    branch = ns.continue_orbit(first, "r", (-0.75, 0.75))
+    left = ns.continue_orbit(row(branch, "transcritical"))
+    for one, slope in ((branch, own), (left, other)):
+        assert one["section"].values[:, 0] == pytest.approx(2 + slope * one["r"].values, abs=1e-9)
+        assert sorted(one["r"].values[[0, -1]]) == [-0.75, 0.75]

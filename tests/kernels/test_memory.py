@@ -82,3 +82,19 @@ def test_sixty_models_take_no_more_memory(tmp_path, monkeypatch):
         assert done.returncode == 0, done.stderr
         print(f"{float(done.stdout):.3f} MB for each model")
         assert float(done.stdout) < most
+
+
+def test_the_code_of_a_model_ends_with_those_that_are_kept():
+    """A model's field is that of no lasting module: none has its name, and with the cache it goes."""
+    import nonsmooth as ns
+    from nonsmooth.system.codegen.generate import compile_model
+
+    number = 1.2345678  # a model that nobody else has
+    modes = {"one": lambda t, u, p: (np.sin(u.x) - number * u.x,)}
+    model = compile_model(ns.System(states=["x"], parameters={"k": 1.0}, modes=modes).traced)
+    field = weakref.ref(model.field)
+    assert model.field.__module__ not in sys.modules
+    del model
+    compile_model.cache_clear()
+    gc.collect()
+    assert field() is None

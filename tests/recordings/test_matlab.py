@@ -176,3 +176,53 @@ def test_version_73_claims_and_links() -> None:
     good = hdf5(linked)
     with pytest.raises(DataFileError, match="cannot be read as a MATLAB file, it is damaged or cut short"):
         parse_recording(good[: len(good) // 2], "bad.mat")
+
+
+def test_an_empty_variable_takes_nothing_from_the_others() -> None:
+    """`note = []`, `c = {}`, `s = struct([])` and `w = ''` beside a recording."""
+    width = element(INT32, struct.pack("<i", 32))
+    empty = [doubles("note", dims=(0, 0)), matrix("c", 1, (0, 0)), chars("w", "")]
+    empty.append(matrix("s", 2, (0, 0), width, element(INT8, b"a".ljust(32, b"\0"))))
+    for one in (*empty, b"".join(empty)):
+        recording = parse_recording(HEADER + VARIABLES + one, "x.mat")
+        assert recording.channels == ("x", "M(1)", "M(2)")
+        assert recording.channel("x").values.tolist() == [4, 5, 6]
+
+
+def test_version_73_leaves_out_what_is_no_vector_of_numbers() -> None:
+    """Empty variables, complex and compound values, a named type, values in other files: the rest is read."""
+
+    def fill(file: Any, h5py: Any) -> None:
+        file["time"] = np.array([[0.0, 0.5]])
+        file["x"] = np.array([[4.0, 5.0]])
+        for name, kind in (("note", "char"), ("none", "double")):  # MATLAB keeps the size of what is empty
+            file[name] = np.array([0, 0], dtype="u8")
+            file[name].attrs["MATLAB_empty"], file[name].attrs["MATLAB_class"] = np.uint8(1), np.bytes_(kind)
+        file["nil"] = h5py.Empty("f8")
+        file["type"] = np.dtype("f8")
+        file["pairs"] = np.zeros(2, dtype=[("a", "f8"), ("b", "f8")])
+        file["words"] = np.array([b"ab", b"cd"])
+        layout = h5py.VirtualLayout((2,), "f8")
+        layout[:] = h5py.VirtualSource("elsewhere.h5", "x", (2,))
+        file.create_virtual_dataset("far", layout)
+
+    recording = parse_recording(hdf5(fill), "x.mat")
+    assert recording.channels == ("x",) and recording.channel("x").values.tolist() == [4, 5]
+    said = "\n".join(recording.warnings)
+    for what in (
+        "/type: is neither a group nor an array; left out",
+        "/far: its values are in other files; left out",
+        "/pairs: holds compound values; left out",
+        "/words: holds |S2 values, no numbers; left out",
+    ):
+        assert what in said
+    assert "note" not in said and "none" not in said and "nil" not in said
+
+
+def test_version_73_complex_numbers_are_named_as_such() -> None:
+    def fill(file: Any, h5py: Any) -> None:
+        file["time"] = np.array([[0.0, 0.5]])
+        file["z"] = np.array([[(1.0, 2.0), (3.0, 4.0)]], dtype=[("real", "f8"), ("imag", "f8")])
+
+    with pytest.raises(DataFileError, match=r"z.*holds complex numbers; save its parts as two real vectors"):
+        parse_recording(hdf5(fill), "x.mat")

@@ -142,3 +142,15 @@ def test_a_flight_that_noise_has_parted_has_no_restitution() -> None:
         parted += found.sizes["impact"]
         assert np.isnan(found["restitution"]).all()
     assert parted > 5
+
+
+def test_heights_of_corners_of_a_turned_body() -> None:
+    """A cube of half-width 1 about (5, -7, 3), and turned by 45 degrees about x: then edges lie sqrt(2) up and down."""
+    eighth = np.pi / 8
+    place = np.tile([5.0, -7.0, 3.0], (2, 1))
+    found = corner_heights(place, [[1, 0, 0, 0], [np.cos(eighth), np.sin(eighth), 0, 0]], cube())
+    assert np.sort(found[0]) == pytest.approx([2.0] * 4 + [4.0] * 4)
+    assert np.sort(found[1]) == pytest.approx([3 - np.sqrt(2)] * 2 + [3.0] * 4 + [3 + np.sqrt(2)] * 2)
+    # about x by a quarter turn what was along y stands along z, not what was along x
+    (quarter,) = corner_heights(place[:1], [[np.cos(2 * eighth), np.sin(2 * eighth), 0, 0]], [[1, 0, 0], [0, 1, 0]])
+    assert quarter == pytest.approx([3.0, 4.0])

@@ -113,3 +113,21 @@ def test_what_is_refused() -> None:
         peak(spectrum(x, 100.0), low=4, high=14)
     with pytest.raises(ValueError, match="interpolation must be one of window, parabola, none"):
         peak(spectrum(x, 100.0), interpolation="best")
+
+
+@pytest.mark.parametrize(("interpolation", "slope"), [("parabola", 0.5 / np.log(2.0)), ("window", 2.0 / 3.0)])
+def test_the_error_of_a_peak_on_a_line_under_a_hann_window(interpolation: str, slope: float) -> None:
+    """Lines 1/2, 1, 1/2 times A: d place = slope (d right - d left) / A; an impulse is noise of one level everywhere.
+
+    A line's noise has the variance 2 sigma^2 sum w^2 / (sum w)^2 = 3 sigma^2 / N, of which lines two apart share 1/6.
+    The level is read as a median, which is ln 2 of the mean where the density is exponential.
+    """
+    amplitude, impulse = 0.3, 1e-4
+    x = amplitude * np.cos(2 * np.pi * 1.5 * np.arange(N) / RATE)
+    x[N // 2] += impulse
+    variance = impulse**2 / (3 * N / 8 * np.log(2.0))
+    error = slope / amplitude * np.sqrt(2 * (1 - 1 / 6) * 3 * variance / N)
+    found = peak(spectrum(x, RATE), interpolation=interpolation)
+    assert found.error == pytest.approx(error * RATE / N, rel=2e-3)
+    assert (found.omega, found.omega_error) == pytest.approx((2 * np.pi * 1.5, 2 * np.pi * found.error), rel=1e-4)
+    assert peak(spectrum(x, RATE), interpolation="none").error == pytest.approx(RATE / N / np.sqrt(12.0))
