@@ -7,6 +7,7 @@ import importlib
 import queue
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -189,3 +190,14 @@ def test_a_page_takes_over_the_process_of_one_that_was_closed() -> None:
     one._popen.wait(30)  # of two that nobody hears one ends
     assert Worker.spare is waiting
     end_spare()
+
+    """The thread that looks whether it has ended by then is one that Python does not wait for."""
+    """What looks whether it has ended by then is a thread that Python does not wait for."""
+    one = Worker.idle(queue.Queue[Answer]().put)
+    one.ask(1, job("diagram", columns=200_000))  # an hour
+    one.close()
+    timers = [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
+    assert timers and all(thread.daemon for thread in threading.enumerate() if thread is not threading.main_thread())
+    one.end()
+    for timer in timers:
+        timer.cancel()
