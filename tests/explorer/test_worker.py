@@ -191,8 +191,9 @@ def test_a_page_takes_over_the_process_of_one_that_was_closed() -> None:
     assert Worker.spare is waiting
     end_spare()
 
+
+def test_work_that_a_closed_page_left_does_not_keep_the_program() -> None:
     """The thread that looks whether it has ended by then is one that Python does not wait for."""
-    """What looks whether it has ended by then is a thread that Python does not wait for."""
     one = Worker.idle(queue.Queue[Answer]().put)
     one.ask(1, job("diagram", columns=200_000))  # an hour
     one.close()
