@@ -14,8 +14,6 @@ from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.events.codimension_two import KINDS, AlongCurve
 from nonsmooth.continuation.march.march import Limits, MarkedPoint
 from nonsmooth.continuation.problems.locus import Locus
-from nonsmooth.continuation.problems.orbits import size_of
-from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import Range, at_least
@@ -74,18 +72,12 @@ def continue_curve(
         raise ValueError(f"a {kind} has no curve here; possible: {', '.join(KINDS)}")
     start = system.with_parameters({own: point.value})
     names, box = _box(start, ranges)
-    shooting = Shooting(start, point.signature, period_number, names)
-    size = size_of(point.maximum, point.minimum, system)
-    X = np.concatenate([point.X[: shooting.size], [start.values[name] for name in names]])
-    shooting.prepare(X, size)
-    widths = (box[0][1] - box[0][0], box[1][1] - box[1][0])
-    locus = Locus(shooting, kind, size, point.period, widths)
-    first = locus.nearest(X / locus.scale, point.value)
+    first = Locus.through(start, kind, point, period_number, names, np.ptp(box, axis=1).tolist())
     if first is None:
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
     allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))
-    policy = AlongCurve(kind, shooting.forced)
-    within = Limits(allowed, step, points, locus.landmark(first))
+    policy = AlongCurve(kind, first.shooting.forced)
+    within = Limits(allowed, step, points, first.curve.landmark(first))
     record = both_ways(policy, within, first.turned(), [record_of(MarkedPoint(first))], first)
     options = {
         "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)},

@@ -255,20 +255,14 @@ def _slope(row: xr.Dataset, name: str) -> float:
     from nonsmooth.continuation.branches.reading import special_row
     from nonsmooth.continuation.events.codimension_two import KINDS
     from nonsmooth.continuation.problems.locus import Locus
-    from nonsmooth.continuation.problems.orbits import size_of
-    from nonsmooth.continuation.problems.shooting import Shooting
 
     if "unknowns" not in row or str(row["kind"].values) not in KINDS:
         return np.nan
     system, kind, own, point, period_number, span = special_row(row, "propagate")
     system = system.with_parameters({own: point.value})
-    shooting = Shooting(system, point.signature, period_number, (name, own))
-    size = size_of(point.maximum, point.minimum, system)
-    X = np.concatenate([point.X[: shooting.size], [system.values[name], point.value]])
-    shooting.prepare(X, size)
     widths = (abs(system.values[name]) or 1.0, abs(span[1] - span[0]))
-    locus = Locus(shooting, kind, size, point.period, widths)
-    first = locus.nearest(X / locus.scale, point.value)
+    first = Locus.through(system, kind, point, period_number, (name, own), widths)
     if first is None or first.tangent[-2] == 0.0:
         return np.nan
-    return float(first.tangent[-1] * locus.scale[-1] / (first.tangent[-2] * locus.scale[-2]))
+    other, along = first.tangent[-2:] * first.curve.scale[-2:]
+    return float(along / other)

@@ -25,10 +25,11 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
-from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits, size_of
 from nonsmooth.continuation.problems.path import Path
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.solve import determinant
+from nonsmooth.system.system import System
 
 STEP = 1e-6  # of central differences, in scaled unknowns
 KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's method
@@ -139,6 +140,18 @@ class Locus(Orbits):
             return None
         null = self.null_vectors(found[0], 1e-9)
         return self.point(found[0], found[1], null[-1]) if len(null) == 1 else None
+
+    @classmethod
+    def through(
+        cls, system: System, kind: str, at: Any, period_number: int, names: tuple[str, str], widths: Sequence[float]
+    ) -> OrbitPoint | None:
+        """The point at a special point as it is kept, on its curve in two parameters."""
+        shooting = Shooting(system, at.signature, period_number, names)
+        size = size_of(at.maximum, at.minimum, system)
+        X = np.append(at.X[: shooting.size], [system.values[name] for name in names])
+        shooting.prepare(X, size)
+        locus = cls(shooting, kind, size, at.period, widths)
+        return locus.nearest(X / locus.scale, at.value)
 
     def _like(self, shooting: Shooting, size: FloatArray) -> Locus:
         """The locus of orbits that are read from another section."""
