@@ -130,3 +130,36 @@ def test_stick_slip_of_a_drill_string_ends_at_a_graze_and_steady_turning_where_f
     branch = ns.special_points(ns.continue_orbit(cycle, "Omega", (1.0, 30.0)))
     assert branch.kind.values.tolist() == ["grazing", "hopf"]
     assert branch.Omega.values[1] == pytest.approx(np.sqrt(40.0) - 1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("element", ["rail", "belt", "joint"])
+def test_a_branch_ends_where_friction_holds_for_ever(element: str) -> None:
+    """Held for ever, where mu is the amplitude of what pulls at the joint, motion is one of a family.
+
+    x'' + 0.1 x' + x = cos(w t) before a wall at rest or a belt that swings by 0.2 sin(w t); or two such masses with a
+    dry joint and loads, one of them driven. A mean force is borne by where the mass is held."""
+    w, s, load = 0.7, 0.2, 0.3
+    Z, hold = 1 - w * w + 0.1j * w, ns.elements.Coulomb
+    elements = {
+        "rail": hold(at="x", friction="mu"),
+        "belt": hold(at="x", friction="mu", belt=lambda t, u, p: s * w * np.cos(w * t)),
+        "joint": hold(at={"x": 1.0, "y": -1.0}, friction="mu"),
+    }
+    # x = y = 1 / (2 Z) in the joint, which bears what drives one of them but not the other.
+    pull = {"rail": 1.0, "belt": abs(1.0 + 1j * s * Z), "joint": 0.5}[element]
+    forcing = {"x": lambda t, p: np.cos(w * t) + load, "y": lambda t, p: 0.0 * t - load}
+    names = ["x", "y"] if element == "joint" else ["x"]
+    system = ns.mechanical(
+        np.eye(len(names)),
+        0.1 * np.eye(len(names)),
+        np.eye(len(names)),
+        coordinates=names,
+        forcing={q: forcing[q] for q in names},
+        parameters={"mu": 0.8 * pull},
+        elements={element: elements[element]},
+    )
+    branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "mu", (0.7 * pull, 1.5 * pull))
+    special = ns.special_points(branch).isel(special=-1)
+    assert branch["ended"].attrs["flag_meanings"].split()[int(branch["ended"][-1])] == "family"
+    assert [float(special["mu"]), float(branch["mu"].max())] == pytest.approx([pull, pull], abs=1e-10)
+    assert [str(special[name].values) for name in ("kind", "sliding")] == ["grazing", "adding_sliding"]

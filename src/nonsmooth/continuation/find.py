@@ -13,7 +13,7 @@ from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.multipliers import multipliers_of, nearest_to_one, stability
 from nonsmooth.continuation.problems.orbits import Orbits
 from nonsmooth.continuation.problems.primitive import primitive
-from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.shooting import Shooting, Solved, in_a_family
 from nonsmooth.continuation.problems.solve import solve
 from nonsmooth.continuation.searches.search import search_within
 from nonsmooth.continuation.searches.settled import (
@@ -46,7 +46,6 @@ MOST, CONVERGED = 30, 1e-12  # iterations, the last step in scaled unknowns
 RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
-FAMILY = 1e-12  # least singular value of I - M: beside it no orbit stands alone
 NEUTRAL = 1e-2  # a multiplier nearer to 1 than this explains that Newton's method did not converge
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
 
@@ -175,7 +174,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
             if shooting.forced:
                 gap = float(guess.gaps[shooting.period_number - 1])
                 left = np.full(shooting.n, np.nan)
-        if solved is None or _in_a_family(shooting, solved):
+        if solved is None or in_a_family(shooting, solved):
             reasons.append(_why(shooting, tried, name))
             continue
         point = curve.described(Point(curve, solved.X / curve.scale, np.empty(0), 0.0, 0, solved))
@@ -218,14 +217,6 @@ def _why(shooting: Shooting, tried: Solved, name: str) -> tuple[str, str]:
                 "translation, a conserved energy, a mass that friction holds wherever it is)"
             )
     return "no_convergence", f"Newton's method did not converge to a {name} orbit"
-
-
-def _in_a_family(shooting: Shooting, solved: Solved) -> bool:
-    """Return whether a forced orbit does not stand alone: a multiplier is 1 to rounding, and any guess solved it."""
-    M = solved.monodromy
-    if not shooting.forced or not np.isfinite(M).all():
-        return False
-    return bool(np.linalg.svd(np.eye(len(M)) - M, compute_uv=False)[-1] <= FAMILY)
 
 
 def _name(period_number: int) -> str:

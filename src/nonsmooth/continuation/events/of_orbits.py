@@ -51,12 +51,14 @@ from nonsmooth.continuation.march.event import (
     special_on,
 )
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
+from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.primitive import is_doubled
-from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.shooting import Shooting, in_a_family
 from nonsmooth.continuation.problems.signature import AT_ONCE
+from nonsmooth.continuation.searches.settled import touching
 from nonsmooth.errors import SystemDefinitionError
 
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
@@ -96,6 +98,10 @@ ENDINGS = {
         "the same instant."
     ),
     "interrupted": INTERRUPTED + "; continue the branch with continue_orbit(branch).",
+    "family": (
+        "Beyond this point the motion is one of a family, such as a mass that friction holds wherever it is: no orbit "
+        "stands alone."
+    ),
     "homoclinic": (
         "The period grows beyond all bounds while states and parameter stand: the cycle ends in a homoclinic (or "
         "heteroclinic) orbit, a connection of equilibria beside which it waits ever longer."
@@ -216,6 +222,13 @@ class AlongOrbits(Policy):
         first = met[0]
         if (after := section_passed(met)) is not None:
             return after
+        if (family := _in_family(first.point)) is not None:
+            near = WITHIN * first.point.curve.width  # the multiplier that comes to 1 there is 1 to rounding before
+            while found.rows and found.rows[-1].mark and abs(found.rows[-1].point.value - first.point.value) < near:
+                found.rows.pop()
+            mark(found, met, family)
+            found.ending = "family"
+            return None
         beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
         special, end = ([], None) if beyond is None else self._between(first.point, beyond)
         if beyond is None or not (_completes(met, beyond) or (end is not None and _completes([end], first.point))):
@@ -318,6 +331,16 @@ def _is_centre(met: Met) -> bool:
     system, name, width = point.shooting.system, point.shooting.active[0], point.curve.width
     free = [change.new.signature for change in met.kind.contacts(point) if not change.gained]
     return any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
+
+
+def _in_family(point: OrbitPoint) -> OrbitPoint | None:
+    """The orbit without the visits that have shrunk to nothing, where it does not stand alone; else None."""
+    for once in touching(point.once, point.shooting.system):
+        curve, X = point.curve.around(once, point.X[point.shooting.size :])
+        solved = curve.shooting.evaluate(X)
+        if in_a_family(curve.shooting, solved):
+            return curve.described(Point(curve, X / curve.scale, np.empty(0), 0.0, 0, solved))
+    return None
 
 
 def mark(found: March, met: list[Met], beyond: OrbitPoint | None, end: Met | None = None, name: str = "") -> str:

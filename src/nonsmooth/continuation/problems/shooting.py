@@ -33,6 +33,7 @@ from nonsmooth.system.system import System
 ROUNDING = 1e-16  # of the period
 SHORT = (0.0, 1e-6, 1e-2)  # of the period, by order: of a shorter visit the mean is taken in place of the quotient
 ON = 1e-6  # of an indicator's size: a state as near to a surface is on it
+FAMILY = 1e-12  # least singular value of I - M: beside it no orbit stands alone
 
 
 @dataclass
@@ -375,3 +376,11 @@ def plane_across(z: FloatArray, field: FloatArray, size: FloatArray) -> tuple[Fl
     """(z_ref, f_ref) of the plane f_ref . (u - z_ref) = 0 through z across the flow, in states divided by ``size``."""
     weighted = field / size**2
     return z.copy(), weighted / max(float(np.abs(weighted * size).max()), 1e-300)
+
+
+def in_a_family(shooting: Shooting, solved: Solved) -> bool:
+    """Return whether a forced orbit does not stand alone: a multiplier is 1 to rounding, and any guess solved it."""
+    M = solved.monodromy
+    if not shooting.forced or not np.isfinite(M).all():
+        return False
+    return bool(np.linalg.svd(np.eye(len(M)) - M, compute_uv=False)[-1] <= FAMILY)

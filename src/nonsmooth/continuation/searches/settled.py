@@ -129,8 +129,10 @@ R = TypeVar("R", bound=Round)
 
 def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[R]:
     """The same motion without contacts that are no more than a touch: an orbit at its grazing point, or none such."""
-    found, i, jumps = guess, 0, system.transitions
+    found, i, jumps, turned = guess, 0, system.transitions, guess.times[:1] + (guess.period - guess.times[-1:])
     kicks = np.full(len(guess.times), np.inf) if kicks is None else kicks
+    if guess.period_number and (turned < TOUCH * guess.period).any():  # a short visit that the section parts is one
+        found, kicks = guess.begun(1, 0.0, guess.states[1]), np.roll(kicks, -1)
     while i < len(found.times):
         visits, times = found.signature.visits, found.times
         here, count = jumps[visits[i].transition], 0
@@ -144,7 +146,7 @@ def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[
             found, kicks = found.without(i, count), np.delete(kicks, np.arange(i, i + count))
         else:
             i += 1
-    return [] if found is guess else [found]
+    return [found] if len(found.times) < len(guess.times) else []
 
 
 @dataclass
