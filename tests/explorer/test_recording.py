@@ -17,7 +17,8 @@ import nonsmooth as ns
 from nonsmooth.explorer.measured import read, strand_distance
 from nonsmooth.explorer.recorded import LARGEST, frequency_of, matched, response_points, samples_of
 from nonsmooth.identification.compare.orbits import fold
-from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
+from nonsmooth.recordings import Recording
+from nonsmooth_savi2007.rig import write_cap, write_capstone_csv
 
 TRUTH = {"k": 8.0, "c": 0.8, "g": -0.004}
 TRAVEL = 0.0789 / (2 * np.pi)  # m per rad, of the rotary sensor

@@ -10,7 +10,8 @@ import pytest
 import xarray as xr
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings import Recording, RecordingWarning, load_session, write_capstone_csv
+from nonsmooth.recordings import Recording, RecordingWarning, load_session
+from nonsmooth_savi2007.rig import write_capstone_csv
 
 HEAD = """
 [session]

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.recordings import write_cap
+from nonsmooth_savi2007.rig import write_cap
 
 E = ns.elements
 

@@ -1,7 +1,6 @@
 """Recordings: what a lab records, as labelled arrays with units, rates and their origin in the file."""
 
 from nonsmooth.recordings.load import load_recording
-from nonsmooth.recordings.readers.capstone_writers import write_cap, write_capstone_csv
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.recordings.session import PROCEDURES, SETTINGS, Quantity, Session, load_session
 
@@ -14,6 +13,4 @@ __all__ = [
     "Session",
     "load_recording",
     "load_session",
-    "write_cap",
-    "write_capstone_csv",
 ]

@@ -26,7 +26,7 @@ from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Reading, Trace
 
 RECORD = np.dtype([("valid", "<u4"), ("value", "<f8")])
 
-#: What ``write_cap`` puts into the header's attribute ``Origin``.
+#: What computed files have in the header's attribute ``Origin``.
 SYNTHETIC = "synthetic"
 
 _TYPED_TEXT = 2

@@ -16,7 +16,7 @@ from nonsmooth.recordings.readers.fields import Field, FieldTable, split_unit, t
 from nonsmooth.recordings.readers.text_table import Numerals, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Reading, names_of
 
-#: What ``write_capstone_csv`` puts behind a run's name: the only free text of the format.
+#: What computed files have behind a run's name: the only free text of the format.
 SYNTHETIC = " [synthetic]"
 
 _TIME = re.compile(

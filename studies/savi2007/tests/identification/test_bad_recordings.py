@@ -17,8 +17,8 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings import Recording, RecordingWarning, write_capstone_csv
-from nonsmooth_savi2007.rig import VirtualRig
+from nonsmooth.recordings import Recording, RecordingWarning
+from nonsmooth_savi2007.rig import VirtualRig, write_capstone_csv
 
 Rows = list[list[str]]
 Damage = Callable[[list[str], Rows], tuple[list[str], Rows]]

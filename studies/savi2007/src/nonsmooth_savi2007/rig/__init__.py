@@ -3,5 +3,16 @@
 from nonsmooth_savi2007.rig.notebook import truth_path
 from nonsmooth_savi2007.rig.truth import FEATURES, NOMINAL_GAP, UNITS, load_truth
 from nonsmooth_savi2007.rig.virtual_rig import IDENTIFICATION, VirtualRig
+from nonsmooth_savi2007.rig.writers import write_cap, write_capstone_csv
 
-__all__ = ["FEATURES", "IDENTIFICATION", "NOMINAL_GAP", "UNITS", "VirtualRig", "load_truth", "truth_path"]
+__all__ = [
+    "FEATURES",
+    "IDENTIFICATION",
+    "NOMINAL_GAP",
+    "UNITS",
+    "VirtualRig",
+    "load_truth",
+    "truth_path",
+    "write_cap",
+    "write_capstone_csv",
+]

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth import Recording
-from nonsmooth.recordings import SETTINGS, write_cap, write_capstone_csv
+from nonsmooth.recordings import SETTINGS
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.truth import UNITS
+from nonsmooth_savi2007.rig.writers import write_cap, write_capstone_csv
 
 if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig

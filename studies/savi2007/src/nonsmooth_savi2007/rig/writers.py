@@ -16,12 +16,12 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import xarray as xr
 
-from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.readers import capstone_cap, capstone_csv
-from nonsmooth.recordings.recording import Recording
-from nonsmooth.results.whole import placed
+from nonsmooth import Recording
+from nonsmooth_savi2007.arrays import FloatArray
 
+RECORD = np.dtype([("valid", "<u4"), ("value", "<f8")])  # of a member of a ``.cap``
 _PAGE = 256  # records; Capstone's members are longer than what was measured
+_SYNTHETIC = "synthetic"  # the label that the reader of either format looks for
 
 
 def write_capstone_csv(
@@ -64,7 +64,7 @@ def write_capstone_csv(
 
     tables = []
     for run in recording.runs:
-        label = f"{recording.tree[run].attrs.get('long_name') or run}{capstone_csv.SYNTHETIC}"
+        label = f"{recording.tree[run].attrs.get('long_name') or run} [{_SYNTHETIC}]"
         columns = []
         for ds in _sensors(recording, run):
             times = ds["time"].values.round(digits) + 0.0
@@ -132,8 +132,7 @@ def write_cap(recording: Recording, path: str | os.PathLike[str], *, sensors: Se
                 )
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>\n<DSProExperiment>\n',
-        '  <Header Version="1" DecimalSeparator="." '
-        f'Origin="{capstone_cap.SYNTHETIC}: computed by nonsmooth, not measured"/>\n',
+        f'  <Header Version="1" DecimalSeparator="." Origin="{_SYNTHETIC}: computed by nonsmooth, not measured"/>\n',
         *(f"  <Sensor {_attributes(sensor)}/>\n" for sensor in sensors),
         "  <DataRepository>\n",
     ]
@@ -165,7 +164,7 @@ def _sensors(recording: Recording, run: str) -> Iterator[xr.Dataset]:
 
 
 def _records(values: FloatArray) -> bytes:
-    table = np.zeros(-(-max(len(values), 1) // _PAGE) * _PAGE, capstone_cap.RECORD)
+    table = np.zeros(-(-max(len(values), 1) // _PAGE) * _PAGE, RECORD)
     table["valid"][: len(values)] = 1
     table["value"][: len(values)] = values
     return table.tobytes()
@@ -184,6 +183,5 @@ def _even(time: FloatArray) -> tuple[float, float] | None:
 
 
 def _put(target: Path, content: bytes) -> Path:
-    with placed(target) as fresh:
-        fresh.write_bytes(content)
+    target.write_bytes(content)
     return target

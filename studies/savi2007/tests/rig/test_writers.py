@@ -13,7 +13,8 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nonsmooth.recordings import Recording, load_recording, write_cap, write_capstone_csv
+from nonsmooth.recordings import Recording, load_recording
+from nonsmooth_savi2007.rig import write_cap, write_capstone_csv
 
 pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.recordings.RecordingWarning")
 
