@@ -11,10 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth_savi2007.rig import write_cap
 
 E = ns.elements
 
@@ -222,14 +220,7 @@ WRITERS = {
     ".pdf": lambda run, file: ns.plot.save_figure(ns.plot.time_history(run), file),
     ".gif": lambda run, file: ns.animate(run, seconds=0.2, rate=10, pixels=150).save(file),
     ".html": lambda run, file: ns.animate(run, seconds=0.2, rate=10, pixels=150).save(file),
-    ".cap": lambda run, file: write_cap(recorded(), file),
 }
-
-
-def recorded() -> ns.Recording:
-    t = np.arange(20.0)
-    sensor = xr.Dataset({"x": ("time", np.sin(t), {"units": "m"})}, {"time": ("time", t, {"units": "s"})})
-    return ns.Recording.from_runs({"r": {"x": sensor}}, synthetic=True)
 
 
 @pytest.mark.parametrize("suffix", WRITERS)

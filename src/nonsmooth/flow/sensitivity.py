@@ -18,7 +18,7 @@ from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state
-from nonsmooth.flow.variational import Segments, VariationalFlow
+from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.system.arguments import checked
 
 if TYPE_CHECKING:
@@ -31,21 +31,25 @@ RTOL = 1e-15  # where the flow is not exact
 
 
 class Variation:
-    """One run taken apart: its segments, the jumps between them, and their products.
+    """One run taken apart: its segments, which end at samples too, the jumps between them, and their products.
+
+    ``z`` (N, n): states at the ``samples`` (N,), with which the segments behind them begin; behind the last there is
+    none.
 
     Attributes
     ----------
-    modes : list of int, times : list of float
-        Mode and beginning of each segment.
+    times : list of float
+        Of the start, and of each jump.
     segments : Segments
     jumps : list of Jump or None
-        Between the segments; transitions at one instant are one. None: nothing but inputs change.
+        Transitions at one instant are one. None: nothing but inputs change.
     transitions : list of tuple of int
         Of each jump; ``CHANGE`` before them, or alone, where inputs change.
     start : Jump or None
         The transitions taken at the start because they held already: nothing moves in time there.
-    Phi, P : array (n, n), (n, n_active)
-        Derivatives of the end in the start and in the parameters, at fixed times.
+    D : array (N, n, n + n_active), rate, of_time : array (N, n)
+        At the samples: derivatives in the start and in the parameters, at fixed times; dz/dt; derivatives in the time
+        of the whole run.
     """
 
     def __init__(
@@ -55,31 +59,44 @@ class Variation:
         log: TrajectoryLog,
         start: tuple[int, FloatArray],
         t_begin: float,
-        t_end: float,
+        samples: FloatArray,
+        z: FloatArray,
         course: DelayedInputs | None,
-        changes: FloatArray,
+        changes: tuple[FloatArray, IntArray],
     ) -> None:
+        n, size = flow.n, flow.n + flow.n_active
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
         flow.catch_up()
         self.start = settled(flow, values, start, first, t_begin)
-        self.modes, starts, self.times, self.transitions, before = apart(
-            flow, log, first, t_begin, (changes, np.arange(1, 1 + len(changes)))
-        )
-        taus = np.diff([*self.times, t_end])
-        self.segments: Segments = flow.segments(values, self.modes, self.times, taus, starts)
-        states = self.segments.z[:-1], np.array(starts[1:]).reshape(-1, flow.n)
-        rates = self.segments.f_end[:-1], self.segments.f_begin[1:]
-        ending = self.transitions, np.array(self.times[1:]), np.array(self.modes[:-1])
-        steps, self.jumps = steps_between(flow, values, *ending, states, before, rates, course)
-        self.Phi, self.P = self.segments.Phi[0], self.segments.P[0]
+        modes, starts, self.times, self.transitions, before = apart(flow, log, first, t_begin, changes)
+        # A sample at a crossing is the limit after it.
+        count, behind = len(self.times), np.searchsorted(self.times[1:], samples, "right")
+        segment = np.concatenate([np.arange(count), behind])
+        order = np.argsort(segment, kind="stable")
+        is_sample = (order >= count)[1:]
+        t = np.concatenate([self.times, samples])[order]
+        begins, of_mode = np.vstack([*starts, z])[order], np.array(modes)[segment[order]]
+        legs = self.segments = flow.segments(values, of_mode[:-1], t[:-1], np.diff(t), begins[:-1])
+        steps = np.zeros((len(is_sample), size, size))
+        steps[:, :n, :n], steps[:, :n, n:] = legs.Phi, legs.P
+        steps[:, range(n, size), range(n, size)] = 1.0
+        ending = np.flatnonzero(~is_sample)
+        states, rates = (legs.z[ending], begins[ending + 1]), (legs.f_end[ending], legs.f_begin[ending + 1])
+        at = self.transitions, t[ending + 1], of_mode[ending]
+        between, self.jumps = steps_between(flow, values, *at, states, before, rates, course)
+        steps[ending + 1] @= between
+        total = np.eye(size)
         if course is not None:
-            self.P = self.P + self.Phi @ course.by_delays(flow, self.segments.f_begin[0])
-        if self.start is not None:
-            self.Phi, self.P = self.Phi @ self.start.R_z, self.P + self.Phi @ self.start.R_p
-        n = flow.n
-        for i, S in enumerate(steps, start=1):
-            self.Phi = self.segments.Phi[i] @ (S[:n, :n] @ self.Phi)
-            self.P = self.segments.Phi[i] @ (S[:n, :n] @ self.P + S[:n, n:]) + self.segments.P[i]
+            total[:n, n:] = course.by_delays(flow, legs.f_begin[0])
+        products = []
+        for step in steps:
+            total = step @ total
+            products.append(total[:n])
+        self.D, self.rate = np.array(products)[is_sample], legs.f_end[is_sample]
+        self.of_time = self.rate - self.D[:, :, :n] @ legs.f_begin[0]
+        if self.start is not None:  # transitions that are taken at once, whenever the run begins
+            self.of_time += self.D[:, :, :n] @ self.start.R_t
+            self.D = self.D @ self.start.R
 
     @property
     def log_determinant(self) -> float:
@@ -246,7 +263,8 @@ def variation(
     instants = np.zeros(1) if changes is None else np.append(0.0, changes.times)
     log = engine.record(engine.prepare(values[None, :]), state, t_end, instants, changes=changes)
     check_complete(log, system, state, system.period())
-    return Variation(flow, values, log, start, 0.0, t_end, course, instants[1:]), log
+    cuts, end = (instants[1:], np.arange(1, len(instants))), np.array([t_end])
+    return Variation(flow, values, log, start, 0.0, end, np.zeros((1, flow.n)), course, cuts), log
 
 
 @checked
@@ -310,7 +328,8 @@ def sensitivity(
     _, length = run_length(system, periods, duration, system.period())
     found, log = variation(system, flow, first_state(system, start, mode), length, course)
     warn_if_slow(system, found.segments.z[:, : len(system.states)], log.u_before, log.u_after)
-    parameter_part = found.P
+    (derivatives,), n = found.D, flow.n
+    parameter_part = derivatives[:, n:]
     if periods is not None and names:
         _, gradient = flow.period(system.parameter_vector())
         parameter_part = parameter_part + np.outer(found.segments.f_end[-1], periods * gradient)
@@ -320,7 +339,6 @@ def sensitivity(
 
     labels = labels_of(system)
     asked |= {"parameters": list(names), "inputs": None if drive is None else drive.data()}
-    n = flow.n
     crossings = [
         (t, chain[-1], jump)
         for t, chain, jump in zip(found.times[1:], found.transitions, found.jumps, strict=True)
@@ -330,7 +348,7 @@ def sensitivity(
         labels,
         provenance(labels, "sensitivity", asked, method="variational"),
         names,
-        Phi=found.Phi,
+        Phi=derivatives[:, :n],
         P=parameter_part,
         end=found.segments.z[-1],
         crossing_time=[t for t, _, _ in crossings],

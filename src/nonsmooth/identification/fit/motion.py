@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.inputs import DelayedInputs, Driven
-from nonsmooth.flow.sensitivity import apart, settled, steps_between
+from nonsmooth.flow.inputs import Driven
+from nonsmooth.flow.sensitivity import Variation
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.system import System
@@ -96,55 +96,9 @@ class Marcher:
         if not derivatives:
             return plain
         cuts = np.zeros(0) if changes is None else changes.times
-        return self._derived(plain, values, begin, z, mode, course, (cuts, 1 + np.searchsorted(instants, cuts)))
-
-    def _derived(
-        self,
-        plain: SampledMotion,
-        values: FloatArray,
-        begin: float,
-        z: FloatArray,
-        mode: int,
-        course: DelayedInputs | None,
-        changes: tuple[FloatArray, IntArray],
-    ) -> SampledMotion | None:
-        """The same with derivatives: products over the pieces between samples and transitions; None where they are not
-        known, as of a start at which several contacts are hit."""
-        flow, log, n = self.flow, plain.log, self.flow.n
-        size = n + flow.n_active
-        first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
+        where, start = (cuts, 1 + np.searchsorted(instants, cuts)), (mode, z)
         try:
-            start = settled(flow, values, (mode, z), first, begin)
-        except ValueError:
+            run = Variation(self.flow, values, log, start, begin, times, plain.z, course, where)
+        except ValueError:  # of a start at which several contacts are hit
             return None
-        modes, starts, times, transitions, before = apart(flow, log, first, begin, changes)
-        # Legs between points: beginnings of segments and samples. A sample at a crossing is the limit after it.
-        segment = np.concatenate([np.arange(len(times)), np.searchsorted(times[1:], plain.time, "right")])
-        order = np.argsort(segment, kind="stable")
-        is_sample = (order >= len(times))[1:]
-        t = np.concatenate([times, plain.time])[order]
-        z0, of_mode = np.vstack([*starts, plain.z])[order], np.array(modes)[segment[order]]
-        legs = flow.segments(values, of_mode[:-1], t[:-1], np.diff(t), z0[:-1])
-        steps = np.zeros((len(is_sample), size, size))
-        steps[:, :n, :n], steps[:, :n, n:] = legs.Phi, legs.P
-        steps[:, range(n, size), range(n, size)] = 1.0
-        ending = np.flatnonzero(~is_sample)
-        states, rates = (legs.z[ending], z0[ending + 1]), (legs.f_end[ending], legs.f_begin[ending + 1])
-        at = transitions, t[ending + 1], of_mode[ending]
-        steps[ending + 1] @= steps_between(flow, values, *at, states, before, rates, course)[0]
-        total = np.eye(size)
-        if course is not None:
-            total[:n, n:] = course.by_delays(flow, legs.f_begin[0])
-        D = np.empty((len(plain.time), n, size))
-        k = 0
-        for step, to_sample in zip(steps, is_sample.tolist(), strict=True):
-            total = step @ total
-            if to_sample:
-                D[k] = total[:n]
-                k += 1
-        rate = legs.f_end[is_sample]
-        of_time = rate - D[:, :, :n] @ legs.f_begin[0]
-        if start is not None:  # transitions that are taken at once, whenever the window begins
-            of_time += D[:, :, :n] @ start.R_t
-            D = D @ start.R
-        return SampledMotion(plain.time, plain.z, plain.mode, plain.segment, log, rate, D, of_time)
+        return replace(plain, rate=run.rate, D=run.D, of_time=run.of_time)

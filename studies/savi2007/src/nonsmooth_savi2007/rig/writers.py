@@ -183,5 +183,9 @@ def _even(time: FloatArray) -> tuple[float, float] | None:
 
 
 def _put(target: Path, content: bytes) -> Path:
-    target.write_bytes(content)
-    return target
+    fresh = target.with_name(f".{target.name}.part")  # what stands there stays until all is written
+    try:
+        fresh.write_bytes(content)
+        return fresh.replace(target)
+    finally:
+        fresh.unlink(missing_ok=True)
