@@ -49,14 +49,18 @@ def row(n, elements, used, impacts="simultaneous"):
     return make
 
 
-def many(n=4):
+def many_elements(n=4):
     """A stop, a friction and an elastic stop at each of four masses: 20 736 combinations of phases."""
     elements = {}
     for i in range(1, n + 1):
         elements[f"s{i}"] = E.Stop(at=f"q{i}", position="pos", restitution="e")
         elements[f"f{i}"] = E.Coulomb(at=f"q{i}", friction="fr")
         elements[f"e{i}"] = E.ElasticStop(at=f"q{i}", side=-1, position=-0.3, stiffness="kc")
-    return row(n, elements, {"pos", "e", "fr", "kc"})
+    return elements
+
+
+def many():
+    return row(4, many_elements(), {"pos", "e", "fr", "kc"})
 
 
 RUBS = {
@@ -211,3 +215,19 @@ def test_a_damping_of_zero_has_a_derivative(pulls):
     found = ns.sensitivity(system, duration=6.0, start={"q": -1.0, "v_q": 1.0}, parameters=["c"])
     assert found.end.values == pytest.approx([np.pi - 5.0, -1.0], abs=1e-12)
     assert float(found.P.sel(state="v_q", parameter="c")) == pytest.approx(0.5 * np.pi, abs=1e-11)
+
+
+@pytest.mark.parametrize("moves", [0.0, 0.1])
+def test_numbers_made_at_another_frequency_serve_only_where_they_do_not_depend_on_it(moves):
+    """A system looked at at one frequency after another answers as one that was never looked at; its walls stand, or
+    swing with the forcing, so that the rates of what they meet depend on the frequency."""
+    wall = E.Stop(at="q1", position=lambda t, u, p: p.pos + moves * np.cos(p.omega * t), restitution="e")
+    make = row(4, many_elements() | {"s1": wall}, {"pos", "e", "fr", "kc"})
+    one = make()
+    for omega in (0.9, 1.1, 0.95):
+        both = [
+            ns.sensitivity(system, duration=25.0, start={**START, "q4": 0.1, "v_q4": 0.1}, parameters=["omega", "pos"])
+            for system in (one.with_parameters(omega=omega), make(omega=omega))
+        ]
+        for name in ("end", "P", "Phi"):
+            np.testing.assert_allclose(both[0][name], both[1][name], rtol=0.0, atol=1e-12)

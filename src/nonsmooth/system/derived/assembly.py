@@ -49,11 +49,11 @@ def kept(method: Method) -> Method:
 
     @wraps(method)
     def known(self: Any, *given: Any) -> Any:
-        answers = self.__dict__.setdefault("_kept", {})
         key = method, given
-        if key not in answers:
-            answers[key] = method(self, *given)
-        return answers[key]
+        if key not in self.__dict__.setdefault("_kept", {}):
+            answer = method(self, *given)
+            self.__dict__["_kept"][key] = answer
+        return self.__dict__["_kept"][key]
 
     return cast("Method", known)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -284,11 +284,14 @@ class Patterns:
 
     def _made(self, point: FloatArray, place: int | None) -> Rows:
         tables = self.form.evaluate(point)
-        if place is None:
-            return Rows(self, tables, 0)
-        slopes = self.form.evaluate(point, place)
-        both = {one.name: getattr(tables, one.name) + 1j * STEP * getattr(slopes, one.name) for one in fields(tables)}
-        return Rows(self, replace(tables, **both), 0)
+        if place is not None:
+            slopes = vars(self.form.evaluate(point, place))
+            tables = replace(tables, **{name: one + 1j * STEP * slopes[name] for name, one in vars(tables).items()})
+        still = [one.tobytes() for name, one in vars(tables).items() if name != "omega"]
+        for like in self._local.rows.values():
+            if like.still == still and not like.turned:
+                return like.at_rates(tables.omega[0] * np.array(self.form.multiples, dtype=float))
+        return Rows(self, tables, still)
 
     def number(self, pattern: Pattern) -> int:
         """The number of a pattern; the next one where it is visited for the first time."""

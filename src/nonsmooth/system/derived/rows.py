@@ -8,6 +8,7 @@ small linear system.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from operator import itemgetter
@@ -82,21 +83,35 @@ class Rows(Assembler):
 
     With complex numbers it is that of derivatives in a parameter, too (:meth:`Patterns.rows_at`)."""
 
-    def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
+    def __init__(self, patterns: Patterns, tables: LinearTables, still: list[bytes]) -> None:
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
-        self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
+        self.rates = tables.omega[0] * np.array(patterns.form.multiples, dtype=float)
         self.scale, self.asks, self.mode = patterns.scale, True, patterns.mode
         self.sequential, self.inputs = patterns.make.sequential, patterns.make.inputs
         self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics), dtype=tables.A.dtype)
-        put_together(self.field, self.n, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
-        every = np.zeros((len(tables.ib[i]), self.field.shape[1]), dtype=self.field.dtype)
-        put_together(every, self.n, tables.ia[i], tables.ib[i], tables.ic[i], tables.is_[i])
+        put_together(self.field, self.n, tables.A[0, 0], tables.b[0, 0], tables.c[0, 0].T, tables.s[0, 0].T)
+        every = np.zeros((len(tables.ib[0]), self.field.shape[1]), dtype=self.field.dtype)
+        put_together(every, self.n, tables.ia[0], tables.ib[0], tables.ic[0], tables.is_[0])
         self._every, self._at, self._grouped = every, patterns.at, patterns.grouped
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
         self.ways: dict[tuple[int, Any], Any] = {}  # out of its phase, of each element in a combination of its group
         self._flows: dict[tuple[int, Any], tuple[FloatArray, dict[int, Any]]] = {}
         self._room = ROOM
+        self.still, self.turned = still, False  # all that they are made of but the frequency; whether that counts too
+
+    def at_rates(self, rates: FloatArray) -> Rows:
+        """The same numbers at another frequency, answers included; those that ask for it are no longer shared."""
+        found = copy(self)
+        found.rates = rates
+        return found
+
+    def _turns(self) -> None:
+        """Keep answers from those of other frequencies: from here on they depend on it."""
+        if not self.turned:
+            self.turned = True
+            self.known, self.ways, self._flows = dict(self.known), dict(self.ways), dict(self._flows)
+            self.__dict__["_kept"] = dict(self.__dict__.get("_kept", {}))
 
     def augmented(self, u: FloatArray, time: float) -> FloatArray:
         """w of states at a time."""
@@ -140,8 +155,10 @@ class Rows(Assembler):
     def along(self, expression: Row, field: FloatArray) -> Row:
         n, e = self.n, expression.values
         values = e[:n] @ field
-        values[n + 1 :: 2] += self.rates * e[n + 2 :: 2]
-        values[n + 2 :: 2] -= self.rates * e[n + 1 :: 2]
+        if e[n + 1 :].any():
+            self._turns()
+            values[n + 1 :: 2] += self.rates * e[n + 2 :: 2]
+            values[n + 2 :: 2] -= self.rates * e[n + 1 :: 2]
         return Row(values, n)
 
     def across(self, expression: Row, part: Part) -> float:
