@@ -133,3 +133,33 @@ def test_a_bubble_of_period_doubling_is_one_branch_from_flip_to_flip() -> None:
     assert found["period_number"].values.tolist() == [1, 2]
     assert found["special_kind"].values.tolist() == ["flip"] * 4
     assert sorted(found["special_value"].values) == pytest.approx([-0.5, -0.5, 0.5, 0.5], abs=1e-9)
+
+
+def test_periods_1_2_and_4_of_a_wall_with_rest_come_from_one_graze() -> None:
+    """Motion without impact touches the wall where F / |k - w^2 + i c w| - load / k is its distance.
+
+    At a graze whose orbit without the wall has complex multipliers all periods may begin."""
+    c, k, F, load, gap = (
+        0.336710350008993,
+        2.317730213602326,
+        0.24714281584229258,
+        0.14154672482822026,
+        0.4081310259118447,
+    )
+    system = ns.mechanical(
+        1.0,
+        c,
+        k,
+        coordinates="q",
+        forcing={"q": lambda t, p: F * np.cos(p.w * t + 4.894847285602623) - load},
+        parameters={"w": 1.45},
+        elements={"wall": ns.elements.Stop(at="q", position=gap, restitution=0.2)},
+    )
+    found = ns.bifurcation_diagram(system, "w", (1.4, 1.5), n=40, transient=150, depth=2, max_period=4, progress=False)
+    assert found["period_number"].values[:3].tolist() == [1, 2, 4] and int(found["complete"])
+    amplitude = F / (gap + load / k)  # (k - x)^2 + c^2 x = amplitude^2, x = w^2
+    touched = np.sqrt(np.roots([1.0, c * c - 2 * k, k * k - amplitude**2]).min())
+    kinds, at = found["special_kind"].values, found["w"].values[found["special_point"].values]
+    for branch in range(3):
+        grazes = at[(kinds == "grazing") & (found["special_branch"].values == branch)]
+        assert np.abs(grazes - touched).min() < 1e-9

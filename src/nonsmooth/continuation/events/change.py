@@ -106,9 +106,11 @@ def without(point: OrbitPoint, place: int, count: int) -> list[Change]:
 
 
 def rest_after(point: OrbitPoint, place: int) -> int | None:
-    """The number of impacts from visit ``place`` on that rest follows at once; None where it does not."""
+    """The number of impacts from visit ``place`` on that rest follows at once; None where it does not, or none is."""
     visits, times = point.signature.visits, point.solved.times
     i = place
+    if place >= point.shooting.m:  # of an orbit with fewer visits
+        return None
     while visits[i].row >= 0 and visits[i + 1].mode == visits[place].mode:
         i += 1
     soon = float(times[i + 1] - times[place + 1]) < BEFORE_REST * float(times[-1])
