@@ -145,3 +145,21 @@ def test_a_branch_by_the_name_of_its_parameter() -> None:
     by_name = ns.continue_orbit(orbit, parameter="rho", range=(0.4, 0.5))
     assert by_name["rho"].values == pytest.approx(ns.continue_orbit(orbit, "rho", (0.4, 0.5))["rho"].values)
     assert by_name["section"].values[:, 0] == pytest.approx(linear().real / P["rho"] * by_name["rho"].values)
+
+
+def test_absolute_tolerances_by_name_in_any_order() -> None:
+    """A coarse one of x and a fine one of v, by name or in the order of the states, are one run; exchanged another."""
+    system = ns.models.relief_valve()
+    names = list(system.states)
+    tolerances = dict(zip(names, 10.0 ** -np.arange(3, 3 + 4 * len(names), 4), strict=True))
+    start = dict.fromkeys(names, 0.3)
+    length = {"duration": 3.0, "samples": 5, "start": start, "method": "rkf45", "rtol": 1e-14}
+    one, other, mirrored = (
+        ns.simulate(system, **length, atol=atol)["u"].values
+        for atol in (dict(reversed(tolerances.items())), [*tolerances.values()], [*tolerances.values()][::-1])
+    )
+    assert (one == other).all() and (one != mirrored).any()
+    with pytest.raises(ValueError, match="atol must name each state of"):
+        ns.simulate(system, **length, atol={names[0]: 1e-9})
+    with pytest.raises(ValueError, match="one number or one for each of"):
+        ns.simulate(system, **length, atol=[1e-9] * (len(names) + 1))

@@ -172,3 +172,25 @@ def test_a_relay_on_a_surface() -> None:
     )
     (found,) = sets(relay)
     assert [found.lower[0], found.upper[0]] == pytest.approx([-0.4, 0.4], abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e3])
+@pytest.mark.parametrize("near", [-0.1, 0.3])
+def test_an_interval_in_any_unit_is_found_from_anywhere_within_it(size: float, near: float) -> None:
+    """Lengths and forces so many times as large: from q = 0.15 +- 0.25, wherever one looks."""
+    rubs = {"f": E.Coulomb(at="q", friction=size * MU)}
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        K,
+        coordinates=["q"],
+        parameters={"P": 0.3 * size},
+        forcing={"q": lambda t, p: p.P},
+        elements=rubs,
+        scale={"q": size, "v_q": size},
+    )
+    (found,) = sets(system, near * size, 0.0)
+    ends = [(0.3 - MU) / K * size, (0.3 + MU) / K * size]
+    assert [found.lower[0], found.upper[0]] == pytest.approx(ends, rel=1e-9)
+    inside = found.holds(size * np.array([[0.0, 0.0], [0.39, 0.0], [0.41, 0.0], [0.0, 0.1]]))
+    assert inside.tolist() == [True, True, False, False]

@@ -72,3 +72,30 @@ def test_a_plan_adds_what_is_known_before() -> None:
         u[prior] = float(plan["uncertainty"].sel(run="one").values.ravel()[0])
     for prior in (1e-3, 1e-4):
         assert u[prior] ** -2 == pytest.approx(u[None] ** -2 + prior**-2, rel=1e-6)
+
+
+def test_a_plan_takes_each_time_the_run_that_adds_most() -> None:
+    """By the information of each run, which the plan holds: greedy over determinants, and what is known by then."""
+    runs = {
+        "short": {"duration": 2.0, "samples": 41, "start": {"x": 1.0}},
+        "long": {"duration": 16.0, "samples": 161, "start": {"x": 1.0}},
+        "large": {"duration": 4.0, "samples": 81, "start": {"x": 3.0}},
+        "late": {"duration": 9.0, "samples": 33, "start": {"x": 0.5}},
+    }
+    plan = ns.plan_experiment(swing(), runs, ["k", "c"], measured={"x": ns.Sensor(noise=0.01)}, free_start=False)
+    information = dict(zip(runs, plan["information"].values, strict=True))
+    left, known, order = [*runs], np.zeros((2, 2)), []
+    while left:
+        best = max(left, key=lambda name: np.linalg.slogdet(known + information[name])[1])
+        left.remove(best)
+        order.append(best)
+        known = known + information[best]
+        after = np.sqrt(np.diag(np.linalg.inv(known)))
+        assert plan["uncertainty_after"].isel(step=len(order) - 1).values == pytest.approx(after, rel=1e-6)
+    assert plan["order"].values.tolist() == order
+
+
+def test_two_samples_of_one_instant_are_refused() -> None:
+    t = np.repeat(T[::2], 2)
+    with pytest.raises(ValueError, match="the time must increase from sample to sample; sample 1 is at 0 after 0"):
+        ns.fit(swing(), {"time": t, "x": decay(4.0, t)}, ["k"], measured="x", **QUIET)

@@ -13,6 +13,8 @@ import sympy as sp
 
 from nonsmooth.explorer.labels import parts_of, plain_of, symbols_of
 from nonsmooth.plot.mechanism import sketch_of_run
+from nonsmooth.system.derived.maps import ESCAPED
+from nonsmooth.system.transition import condition_text
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -93,6 +95,13 @@ def equations_of(system: System) -> list[tuple[str, str]]:
     fields = dict(zip(traced.mode_names, traced.fields, strict=True))
     if loads is not None and loads.elements:
         fields = dict(loads.fields)
+    if system.is_map:  # between iterates its states stand still
+        names = traced.indicator_names
+        fields = {
+            condition_text([(names[row[0]], *row[1:]) for row in one.rows]): image
+            for one in traced.transitions
+            if (image := one.reset) and image[0] != ESCAPED
+        }
     found: list[tuple[str, str]] = []
     seen: set[tuple[Any, Any]] = set()
     for mode, field in [*fields.items()][:_LONGEST]:
