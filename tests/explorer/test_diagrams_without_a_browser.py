@@ -64,8 +64,9 @@ def test_the_diagram_is_a_line_through_the_section_points(shown: str) -> None:
 
 
 def test_one_direction_has_one_cloud() -> None:
+    tab = opened("&over=rho&low=0.2&high=0.5&direction=up&shown=x")
     for direction, color in (("up", COLORS["first"]), ("down", COLORS["second"])):
-        tab = opened(f"&over=rho&low=0.2&high=0.5&direction={direction}&shown=x")
+        tab.act("set", "direction", direction)
         (image,) = tab.data("diagram image")["image"]
         (shade,) = {int(pixel) & 0xFFFFFF for pixel in image[image > 0]}
         red, green, blue = (int(color[i : i + 2], 16) for i in (1, 3, 5))

@@ -47,7 +47,7 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> ns.Recording:
     file: Path = tmp_path_factory.mktemp("runs") / "runs.csv"
     rows = [(n, t, x) for n, k in ((1, 4.0), (2, 9.0)) for t, x in zip(T, decay(k, T) + NOISE[n - 1], strict=True)]
     pd.DataFrame(rows, columns=["n", "t", "x"]).to_csv(file, index=False)
-    return ns.load_recording(file, columns={"run": "n", "time": "t", "x": ("x", "m")})
+    return ns.load_recording(file, columns={"run": "n", "time": ("t", "s"), "x": ("x", "m")})
 
 
 def test_some_of_the_runs(two_runs: ns.Recording) -> None:
