@@ -146,7 +146,7 @@ def rubs():
 def test_an_orbit_and_its_branch_go_on_from_a_file(tmp_path):
     """Modes and transitions are numbered as they are met: another process reads them by what they are."""
     orbit = ns.find_orbit(rubs())
-    branch = ns.continue_orbit(orbit, "omega", (0.895, 0.92))
+    branch = ns.continue_orbit(orbit, "omega", (0.899, 0.915))
     assert "special" in branch.sizes
     ns.save(orbit.to_dataset(), tmp_path / "orbit.nc")
     ns.save(branch, tmp_path / "branch.nc")
@@ -155,8 +155,8 @@ def test_an_orbit_and_its_branch_go_on_from_a_file(tmp_path):
     assert names[0] == names[1]
     assert len(set(names[0])) > 2
     np.testing.assert_array_equal(again.floquet_multipliers, orbit.floquet_multipliers)
-    longer = ns.continue_orbit(ns.load(tmp_path / "branch.nc"), range=(0.895, 0.94))
-    shorter = ns.continue_orbit(orbit, "omega", (0.895, 0.94))
+    longer = ns.continue_orbit(ns.load(tmp_path / "branch.nc"), range=(0.899, 0.936))
+    shorter = ns.continue_orbit(orbit, "omega", (0.899, 0.936))
     assert list(longer.special_kind.values) == list(shorter.special_kind.values)
     np.testing.assert_allclose(longer.special_value, shorter.special_value, rtol=1e-8)
 

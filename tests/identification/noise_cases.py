@@ -87,7 +87,7 @@ def fitted(name, kind, seed):
     return found, np.array([(found[k] - truth[k]) / found.uncertainty[k] for k in find])
 
 
-def lacking(name, kind, seed=0):
+def lacking(name, kind, seed=0, tries=3):
     """The fit of a model that lacks a term, and the term's effect on the motion, in noise deviations."""
     find, term = LACKING[name]
     rng = np.random.default_rng(seed)
@@ -97,4 +97,4 @@ def lacking(name, kind, seed=0):
     without = case.motion({**truth, term: 0.0}, case.start(np.random.default_rng(seed)), t)[:, 0]
     effect = np.abs(without - clean).max() / (LEVEL * clean.std())
     system = off(system, truth, find, rng, **{term: 0.0})
-    return ns.fit(system, {quantity: (t, y)}, find, tries=3, progress=False), effect
+    return ns.fit(system, {quantity: (t, y)}, find, tries=tries, progress=False), effect

@@ -104,7 +104,10 @@ def test_models_with_an_input_are_ranked_by_what_they_predict() -> None:
     assert ns.select_model(models, record, measured=["x"], folds=2, progress=False).attrs["best"] == "damped"
 
 
-@pytest.mark.parametrize("seed", [1, 2, 6])
+SLOW = (pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6))
+
+
+@pytest.mark.parametrize("seed", [2, *SLOW])
 def test_two_records_of_a_driven_mass_with_a_stop_and_friction_whose_sensor_is_late(seed: int) -> None:
     """Different rates, a gain between units, and a delay to be found: first guesses end windows before their time."""
     rng, elements = np.random.default_rng(seed), ns.elements

@@ -124,8 +124,8 @@ def test_a_knock_is_left_out_and_named() -> None:
     y[hand] += 0.3 * np.sin(9.0 * (T[hand] - 7.4) / 0.6)
     y = y + 2e-3 * rng.standard_normal(T.size)
     guess = oscillator(k=8.7, c=0.2)
-    kept = ns.fit(guess, {"q": (T, y)}, ["k", "c"], progress=False, tries=2)
-    found = ns.fit(guess, {"q": (T, y)}, ["k", "c"], leave_out=True, progress=False, tries=2)
+    kept = ns.fit(guess, {"q": (T, y)}, ["k", "c"], progress=False, tries=1)
+    found = ns.fit(guess, {"q": (T, y)}, ["k", "c"], leave_out=True, progress=False, tries=1)
     assert kept.anomalies and not found.anomalies
     (note,) = [note for note in found.notes if note.startswith("left out")]
     begin, end = (float(word.strip(",")) for word in np.array(note.split())[[4, 6]])
@@ -163,7 +163,7 @@ def test_a_knock_in_one_of_two_driven_runs_with_a_stop() -> None:
         per_run=["F"],
         leave_out=True,
         progress=False,
-        tries=4,
+        tries=2,
     )
     within(found, {"k": 9.0, "c": 0.1, "e": 0.8, "F, 0": 0.5, "F, 1": 0.55, "phase, 0": 0.2, "phase, 1": 0.7})
     assert len([note for note in found.notes if note.startswith("left out: run 1")]) == 1

@@ -29,13 +29,15 @@ def report() -> Any:
     return ns.smoothing_report(friction(), [ETA, 1e-4, 1e-3], band=list(SHARES), n_starts=3, progress=False)
 
 
-def end_of_period(u: np.ndarray, band: str) -> np.ndarray:
+def end_of_period(u: np.ndarray, band: str, rtol: float = 1e-10) -> np.ndarray:
     """x'' = cos(0.4 t) - x - 0.1 x' - 0.3 (2 q(x') - 1), by Radau's method."""
 
     def field(t: float, u: np.ndarray) -> list[float]:
         return [u[1], np.cos(0.4 * t) - u[0] - 0.1 * u[1] - 0.3 * (2 * SHARES[band](u[1] / ETA) - 1)]
 
-    return solve_ivp(field, (0, 2 * np.pi / 0.4), u, method="Radau", rtol=1e-10, atol=1e-12, max_step=0.02).y[:, -1]
+    return solve_ivp(
+        field, (0, 2 * np.pi / 0.4), u, "Radau", rtol=rtol, atol=1e-2 * rtol, max_step=0.02 if rtol < 1e-8 else 0.1
+    ).y[:, -1]
 
 
 @pytest.mark.parametrize("band", SHARES)
@@ -44,7 +46,8 @@ def test_the_smoothed_orbit_and_its_multiplier_against_scipy(report: Any, band: 
     u = one.section.values
     assert end_of_period(u, band) == pytest.approx(u, abs=1e-7)
     largest = one.floquet_multipliers.values[0].real
-    slopes = [(end_of_period(u + d, band) - end_of_period(u - d, band)) / 2e-3 for d in 1e-3 * np.eye(2)]
+    ends = [[end_of_period(u + sign * d, band, 1e-7) for sign in (1, -1)] for d in 1e-3 * np.eye(2)]
+    slopes = [(one - other) / 2e-3 for one, other in ends]
     assert np.linalg.eigvals(np.array(slopes).T).max() == pytest.approx(largest, abs=2e-4)
     sharp = ns.find_orbit(friction())
     assert float(one.state_difference) == pytest.approx(np.abs(u - sharp.u).max(), rel=1e-6)

@@ -131,6 +131,7 @@ def apart(
     before: list[FloatArray] = []
     memory = first[1][n_u:]
     instants, places = changes
+    u_before, u_after = np.nan_to_num(log.u_before), np.nan_to_num(log.u_after)
     taken, crossings = 0, len(log.crossing_time)
 
     def change(upto: float, crossing: int) -> None:
@@ -143,7 +144,7 @@ def apart(
             return
         u = np.nan_to_num(log.sample_u[places[here]])
         if crossing < crossings and log.crossing_time[crossing] == instants[taken - 1]:
-            u[-1] = np.nan_to_num(log.u_before[crossing])
+            u[-1] = u_before[crossing]
         states = [*np.hstack([u, np.tile(memory, (count, 1))])]
         transitions.extend([(CHANGE,)] * count)
         before.extend(states)
@@ -154,13 +155,13 @@ def apart(
     for i, t in enumerate(log.crossing_time):
         change(t, i)
         k = int(log.crossing_transition[i])
-        after = np.concatenate([np.nan_to_num(log.u_after[i]), log.memory_after[i]])
+        after = np.concatenate([u_after[i], log.memory_after[i]])
         if transitions and t == times[-1]:  # a chain at one instant
             transitions[-1] += (k,)
             modes[-1], starts[-1] = targets[k], after
         else:
             transitions.append((k,))
-            before.append(np.concatenate([np.nan_to_num(log.u_before[i]), memory]))
+            before.append(np.concatenate([u_before[i], memory]))
             modes.append(targets[k])
             starts.append(after)
             times.append(float(t))

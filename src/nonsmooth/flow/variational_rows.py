@@ -80,20 +80,37 @@ class RowsFlow(VariationalFlow):
 
     def kept(self, values: FloatArray) -> Any:
         """The rows at parameters: those of the last few are kept."""
+        return self._known(values)[0]
+
+    def _known(self, values: FloatArray) -> tuple[Any, dict[tuple[int, int], Any]]:
+        """The rows at parameters, and what is known of conditions in modes there."""
         kept = self._local.__dict__.setdefault("rows", {})
         key = np.asarray(values, dtype=float).tobytes()
         if key not in kept:
             found = self._at(np.array(values, dtype=float))
             while len(kept) >= KEPT:
                 del kept[next(iter(kept))]
-            kept[key] = found
-        return kept[key]
+            kept[key] = found, {}
+        known: tuple[Any, dict[tuple[int, int], Any]] = kept[key]
+        return known
 
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
-        rows, fields, rates = self._taken(self.kept(values), i, mode)
-        n, angles = self.n, rates[0] * t
-        waves = np.array([np.cos(angles), np.sin(angles)])
-        w = np.concatenate([z, [1.0], waves.T.ravel()])
+        at, known = self._known(values)
+        if (i, mode) not in known:
+            known[i, mode] = self._along(*self._taken(at, i, mode))
+        every, turning, rates = known[i, mode]
+        angles = rates * t
+        w = np.concatenate([z, [1.0], np.array([np.cos(angles), np.sin(angles)]).T.ravel()])
+        own, changing = every @ w, turning @ w
+        found: list[Any] = []
+        for h, row, turned in zip(own, every[:, 0, : self.n].copy(), changing, strict=True):
+            found += [float(h[0]), row, float(turned[0]), h[1:] + t * turned[1:]]
+        return Touch(*found)
+
+    def _along(self, rows: FloatArray, fields: FloatArray, rates: FloatArray) -> tuple[FloatArray, ...]:
+        """The rows of a condition and of its two derivatives along the flow, and those derivatives in the active
+        parameters, (3, 1 + n_active, M); how they change as the harmonics turn; the rates of these."""
+        n, orders = self.n, [rows]
 
         def turned(row: FloatArray, speeds: FloatArray) -> FloatArray:
             """The row of the change of a row whose harmonics turn; of each row, or at each of several speeds."""
@@ -102,24 +119,12 @@ class RowsFlow(VariationalFlow):
             found[..., n + 2 :: 2] = -speeds * row[..., n + 1 :: 2]
             return found
 
-        def along(rows: FloatArray) -> FloatArray:
-            """The same of its derivative along the flow."""
-            slopes = np.empty_like(rows)
-            slopes[0] = rows[0, :n] @ fields[0]
-            for p in range(1, len(rows)):
-                slopes[p] = rows[p, :n] @ fields[0] + rows[0, :n] @ fields[p]
-            if self.harmonics:
-                slopes += turned(rows, rates[0])
-                slopes[1:] += turned(rows[0], rates[1:])
-            return slopes
-
-        found: list[Any] = []
-        for every in (rows, slopes := along(rows), along(slopes)):
-            own, changing = every @ w, np.zeros(len(rows))
-            if self.harmonics and every[0, n + 1 :].any():
-                changing = turned(every[0], rates) @ w
-            found += [float(own[0]), every[0, :n].copy(), float(changing[0]), own[1:] + t * changing[1:]]
-        return Touch(*found)
+        for _ in range(2):
+            last = orders[-1]
+            slopes = last[:, :n] @ fields[0] + turned(last, rates[0])
+            slopes[1:] += last[0, :n] @ fields[1:] + turned(last[0], rates[1:])
+            orders.append(slopes)
+        return np.array(orders), np.array([turned(one[0], rates) for one in orders]), rates[0]
 
 
 class LinearFlow(RowsFlow):
@@ -245,7 +250,7 @@ class PatternFlow(RowsFlow):
         self.catch_up()
 
     def _at(self, values: FloatArray) -> Packed:
-        last = next(reversed(self._local.rows.values()), None)
+        last, _ = next(reversed(self._local.rows.values()), (None, None))
         return Packed(self.patterns, self.traced, values, self.places, last)
 
     def on_path(self, values: FloatArray, modes: Any) -> FloatArray:

@@ -112,7 +112,9 @@ class Locus(Orbits):
             ahead, behind = Y.copy(), Y.copy()
             ahead[j] += STEP
             behind[j] -= STEP
-            g[j] = (self.psi(self.evaluate(ahead)) - self.psi(self.evaluate(behind))) / (2 * STEP)
+            motions = (self.shooting.evaluate(Y * self.scale, self.kind != "grazing") for Y in (ahead, behind))
+            one, other = map(self.psi, motions)
+            g[j] = (one - other) / (2 * STEP)
         return g
 
     def fill(self, solved: Solved, matrix: FloatArray) -> None:

@@ -248,8 +248,8 @@ class Shooting:
         solved.X, solved.times, solved.values = X, self.instants(X), self.parameters(X)
         return solved
 
-    def evaluate(self, X: FloatArray) -> Solved:
-        """Residual and Jacobian at X."""
+    def evaluate(self, X: FloatArray, equations: bool = True) -> Solved:
+        """Residual and Jacobian at X; without ``equations`` only what the motion is."""
         n, m, size = self.n, self.m, self.size
         values = self.parameters(X)
         t, z = self.split(X)
@@ -260,6 +260,10 @@ class Shooting:
         lengths = times[1:] - times[:-1]
         lengths[np.abs(lengths) < ROUNDING * abs(end)] = 0.0  # the step of the next visit is not begun from rounding
         segments = self.flow.segments(values, self.modes, times[:-1], lengths, z)
+        if not equations:
+            return Solved(
+                X, times[:0], segments.P[0, :0], times, segments, [], values, self.free, self.at_once, self.forced
+            )
         # The states before the transitions, differentiated in t_(i-1), z_i, t_i (neighbours in X) and the parameters
         pull = np.matmul(segments.Phi, segments.f_begin[:, :, None])
         D = np.empty((m + 1, n, n + 2 + self.n_active))

@@ -141,24 +141,31 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         raise ValueError(f"run {name!r}: sections need `period_number` for each run, as nonsmooth.sweep gives it")
     named = [measured] if isinstance(measured, str) else list(measured or system.states)
     named = [q for q in named if q in system.states] or named
-    frame = frame.assign(**{key: of for key, of in (("state", named[0]), ("iterate", 0)) if key not in frame})
+    usual = {"state": named[0], "iterate": 0, f"{kind}_error": np.nan, "period_number": 1}
+    frame = frame.assign(**{key: of for key, of in usual.items() if key not in frame})
     states = list(dict.fromkeys(frame["state"]))
     wanted = [state for state in named if state in states] or states
     for state in wanted:
         if state not in system.states or state not in named:
             raise ValueError(f"run {name!r}: {unknown(state, 'a measured state', repr(system.name), system.states)}")
     runs, rows, left = list[Any](), list[Any](), 0
-    for _, part in sorted(frame.groupby(over, sort=False), key=lambda pair: tuple(pair[1][set_].iloc[0])):
-        points = part.pivot(index="iterate", columns="state", values=kind)[wanted].dropna().to_numpy(float)
-        at, q = part[set_].to_numpy(float)[0], part["period_number"].iloc[0] if "period_number" in part else 1
+    set_at, held, errors, numbers = (frame[k].to_numpy(float) for k in (set_, kind, f"{kind}_error", "period_number"))
+    which, order = frame["state"].to_numpy(), np.unique(frame["iterate"], return_inverse=True)[1]
+    for some in sorted(frame.groupby(over).indices.values(), key=lambda some: (*set_at[some[0]], some[0])):
+        points, size = np.full((1 + order.max(), len(wanted)), np.nan), np.full(len(wanted), np.nan)
+        for c, state in enumerate(wanted):
+            mine = some[which[some] == state]
+            points[order[mine], c] = held[mine]
+            size[c] = next((one for one in errors[mine] if one == one), np.nan)
+        points = points[~np.isnan(points).any(axis=1)]
+        at, q = set_at[some[0]], numbers[some[0]]
         q = 1 if kind == "amplitude" and q else q
         if not 0 < q <= min(LONGEST, len(points)) or not np.isfinite(at).all():
             left += 1
             continue
-        size = part.reindex(columns=["state", f"{kind}_error"]).groupby("state").first().loc[wanted].to_numpy(float)
         for k in range(int(q)):
             cycle = points[k :: int(q)]
-            each = zip(cycle.mean(axis=0), size[:, 0] / np.sqrt(len(cycle)), strict=True)
+            each = zip(cycle.mean(axis=0), size / np.sqrt(len(cycle)), strict=True)
             rows += [(len(runs), k, c, y, error) for c, (y, error) in enumerate(each)]
         runs.append(at)
     if not runs:
@@ -200,7 +207,8 @@ def predicted(
     plan = section_plan(system, Stroboscopic(0.0))[1]
     settler = Settler(system, marcher.engine, plan, TRANSIENT, KEPT, LONGEST, False)
     rows = np.concatenate([np.arange(count), np.arange(count)[::-1]])
-    found = settler.run(points, rows, np.repeat(start_states(system, None)[:1], len(rows), axis=0), carried=True)
+    starts = np.repeat(start_states(system, None)[:1], len(rows), axis=0)
+    found = marcher.once(points.tobytes(), len(rows), lambda: settler.run(points, rows, starts, carried=True))
     columns = [list(system.states).index(name) for name in one.quantities]
     gain, offset = (np.array([getattr(sensor, word) for sensor in sensors]) for word in ("gain", "offset"))
     if one.amplitude:
@@ -208,6 +216,7 @@ def predicted(
     fitted, of = np.full(len(one.measured), np.nan), np.zeros((len(one.measured), (a + 2) * slopes))
     periodic, good = np.zeros(len(fitted), bool), usable(found.status)
     tables: dict[tuple[int, int, int], FloatArray] = {}
+    acts = ~np.isin(marcher.flow.places, one.places)
     for run, i in enumerate(one.setting):
         mine = np.flatnonzero(one.run == run)
         if not len(mine):
@@ -235,7 +244,7 @@ def predicted(
             if key not in tables:
                 tables[key] = _slopes(one, marcher, points[i], found, *key)[:, columns]
             table = tables[key]
-            of[mine, :a] = (gain[:, None] * table).reshape(len(mine), a) * ~np.isin(marcher.flow.places, one.places)
+            of[mine, :a] = (gain[:, None] * table).reshape(len(mine), a) * acts
             of[mine, a] = y.ravel() * (np.tile(np.sign([s.gain for s in sensors]), shape[0]) if one.amplitude else 1.0)
             of[mine, a + 1] = 0.0 if one.amplitude else 1.0
     return fitted, periodic, of
@@ -263,26 +272,21 @@ def _slopes(
     period, of_period = flow.period(values)
     z, mode, length = np.nan_to_num(found.last[job][:n]), int(found.mode[job]), number * period
 
-    def motion(times: FloatArray, derivatives: bool = True) -> SampledMotion | None:
-        return marcher.run(values, 0.0, times, z, mode, derivatives)
-
-    round_ = motion(np.array([length]))
-    if round_ is None:
-        return none
-    assert round_.D is not None and round_.rate is not None
-    moved = round_.D[0, :, n:] + np.outer(round_.rate[0], number * of_period)
-    try:
-        of_start = np.linalg.solve(np.eye(n) - round_.D[0, :, :n], moved)
-    except np.linalg.LinAlgError:  # on a fold
-        return none
-
-    def along(times: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Derivatives (N, n, n_active) at fixed times, and rates (N, n)."""
-        there = motion(times)
+    def along(times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+        """Derivatives (N, n, n_active) at fixed times, and rates (N, n); derivatives of the start."""
+        at: FloatArray = np.unique(np.append(times, length))
+        there = marcher.run(values, 0.0, at, z, mode, True)
         if there is None:
             return None
         assert there.D is not None and there.rate is not None
-        return there.D[:, :, :n] @ of_start + there.D[:, :, n:], there.rate
+        end, here, D, rate = np.searchsorted(at, length), np.searchsorted(at, times), there.D, there.rate
+        moved = D[end, :, n:] + np.outer(rate[end], number * of_period)
+        try:
+            of_start = np.linalg.solve(np.eye(n) - D[end, :, :n], moved)
+        except np.linalg.LinAlgError:  # on a fold
+            return None
+        D = D[:, :, :n] @ of_start + D[:, :, n:]
+        return D[here], rate[here], np.asarray(of_start)
 
     if not one.amplitude:
         k = shift + np.arange(wanted)
@@ -290,10 +294,11 @@ def _slopes(
         if at is None:
             return none
         table = at[0] + at[1][:, :, None] * k[:, None, None] * of_period
-        return np.where((k > 0)[:, None, None], table, of_start)
-    grid, hits = np.arange(1, _FINE * number + 3) * (period / _FINE), round_.log.crossing_time
-    hits = np.concatenate([hits, hits + length])  # a whole cycle lies within the ends of the grid
-    full = motion(np.union1d(grid, hits[(hits > 0.0) & (hits < grid[-1])]), False)
+        return np.where((k > 0)[:, None, None], table, at[2])
+    grid: Any = np.arange(1, _FINE * number + 3) * (period / _FINE)  # a whole cycle lies within its ends
+    full = marcher.run(values, 0.0, grid, z, mode)
+    if full is not None and len(hits := full.log.crossing_time):
+        full = marcher.run(values, 0.0, np.union1d(grid, hits[(hits > 0.0) & (hits < grid[-1])]), z, mode)
     if full is None:
         return none
     instants = np.array([[_extreme(full, k, sign) for sign in (1.0, -1.0)] for k in range(n)])
