@@ -84,7 +84,7 @@ def test_two_folds_meet_in_a_cusp(figure_9: xr.Dataset) -> None:
         assert int((ns.special_points(branch)["kind"] == "fold").sum()) == folds
 
 
-@pytest.mark.parametrize("damping", [0.2, 0.15])
+@pytest.mark.parametrize("damping", [0.2, pytest.param(0.15, marks=pytest.mark.slow)])
 def test_grazing_curve_while_its_touch_and_a_crossing_pass_the_section(damping: float) -> None:
     """x touches a wall, on which it may rest, for A = sqrt((1 - w^2)^2 + (0.2 w)^2), whatever a second mass does.
 

@@ -171,7 +171,7 @@ def test_where_impacts_accumulate() -> None:
 
     Beyond an impact so slow that it is completed as rest the orbit jumps by up to 1e-7 of its size: the first of them,
     where rest ends, is known no better."""
-    table, limits = templates._table().with_parameters(e=0.2373710, c=0.0564473), (2.14, 2.2)
+    table, limits = templates._table().with_parameters(e=0.2373710, c=0.0564473), (2.168, 2.178)
     first = ns.find_orbit(table.with_parameters(a=limits[0]), start=[0.1, 0.0], progress=False)
     branch = ns.continue_orbit(first, "a", limits)
     at = int(np.flatnonzero(np.diff(np.sign(branch["a"].values - 2.1727)))[-1])

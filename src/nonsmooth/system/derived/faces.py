@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
@@ -35,6 +37,19 @@ def independent(rows: FloatArray, order: Iterable[int]) -> tuple[list[int], floa
     return chosen, doubt
 
 
+def linked(acts: NDArray[Any]) -> list[list[int]]:
+    """The places apart by which acts on which, or is acted on, directly or through others."""
+    near = (acts != 0) | (acts.T != 0)
+    left, found = list(range(len(near))), []
+    while left:
+        some = [left.pop(0)]
+        for i in some:
+            some += [j for j in left if near[i, j]]
+            left = [j for j in left if not near[i, j]]
+        found.append(sorted(some))
+    return found
+
+
 def as_sums(ways: FloatArray, chosen: Sequence[int]) -> FloatArray:
     """The rows of ``ways`` as sums of those that are chosen, (all, chosen)."""
     sums = np.linalg.lstsq(ways[chosen].T, ways.T, rcond=None)[0].T
@@ -49,8 +64,6 @@ def weakest(
     ``sums`` (held, independent) are what each of them is of independent ones; ``bounded`` those that have bounds of
     their own; ``cones`` contacts that stick: the place of the normal force, of the tangential one, and the friction.
     The others push only: their weights are not positive."""
-    from scipy.sparse.csgraph import connected_components
-
     edges: list[FloatArray] = []
     one_sided: list[bool] = []
     for j, row in enumerate(sums):
@@ -61,9 +74,8 @@ def weakest(
         one_sided += [j not in bounded] * len(own)
     body, pushes = np.array(edges), np.array(one_sided)
     touched = body != 0
-    number, labels = connected_components(touched.T.astype(int) @ touched.astype(int), directed=False)
     found: list[FloatArray] = []
-    for here in (labels == g for g in range(number)):
+    for here in linked(touched.T @ touched):
         some = touched[:, here].any(axis=1)
         found += [sums[:, here] @ normal for normal in _faces(body[np.ix_(some, here)], pushes[some])]
     return found

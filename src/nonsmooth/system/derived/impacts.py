@@ -19,7 +19,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.system.derived.elements.element import CREEP, SMALL
-from nonsmooth.system.derived.faces import least
+from nonsmooth.system.derived.faces import least, linked
 from nonsmooth.system.derived.instants import ZERO
 
 if TYPE_CHECKING:
@@ -79,14 +79,11 @@ class Instant:
     def apart(self, contacts: list[int]) -> list[list[int]]:
         """Contacts that approach, with closed ones that feel them; beside those that rub apart by whose impulses change
         whose rates."""
-        from scipy.sparse.csgraph import connected_components
-
         if not self.make.rubbing or len(contacts) == 1:
             return [contacts]
         own = [[k, *([self.make.rubbing[k]] if k in self.make.rubbing else [])] for k in contacts]
-        felt = [[self.numbers.effects(one, other).any() for other in own] for one in own]
-        labels = connected_components(np.array(felt, dtype=int).reshape(len(own), -1), directed=False)[1]
-        blocks = [[k for k, one in zip(contacts, labels, strict=True) if one == g] for g in dict.fromkeys(labels)]
+        felt = np.array([[self.numbers.effects(one, other).any() for other in own] for one in own])
+        blocks = [[contacts[i] for i in some] for some in linked(felt)]
         return [block for block in blocks if any(self.speeds[k] < 0.0 for k in block)]
 
     def strike(self, contacts: list[int], restitution: dict[int, float]) -> tuple[int, ...]:

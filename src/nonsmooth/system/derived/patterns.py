@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
@@ -97,7 +96,6 @@ class Patterns:
                 self._keep((k, name, side), self.make.law(k, name, side))
         self._lock, self._local = threading.Lock(), threading.local()
         self._known: dict[Pattern, int] = {}
-        self._groups: dict[bytes, list[list[int]]] = {}
         self._jumped: dict[Lead, int] = {}
         self._seen: tuple[tuple[int, int], Any] = (0, 0), None
         self.number((0,) * len(self.make.parts))
@@ -198,17 +196,6 @@ class Patterns:
             states.append(way.states)
         together = Lead(pattern, pattern, "", tuple(dict.fromkeys(meets)), TOGETHER)
         return conditions, [*found, together], [*states, None], [slot for slot, _, _ in meets]
-
-    def grouped(self, changes: NDArray[np.bool_]) -> list[list[int]]:
-        """The elements apart by which of them changes the rates of which, and which names which."""
-        key = changes.tobytes()
-        if key not in self._groups:
-            from scipy.sparse.csgraph import connected_components
-
-            names = [[name in vars(element).values() for name in self.elements] for element in self.elements.values()]
-            number, labels = connected_components(changes | np.array(names), directed=False)
-            self._groups[key] = [np.flatnonzero(labels == g).tolist() for g in range(number)]
-        return self._groups[key]
 
     def look_at(self, rows: Rows, pattern: Pattern) -> None:
         """Give all ways out of a pattern their numbers."""

@@ -20,6 +20,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, SystemDefinitionError
 from nonsmooth.system.codegen.linear import put_together
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError, kept
+from nonsmooth.system.derived.faces import linked
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearTables
@@ -92,7 +93,7 @@ class Rows(Assembler):
         put_together(self.field, self.n, tables.A[0, 0], tables.b[0, 0], tables.c[0, 0].T, tables.s[0, 0].T)
         every = np.zeros((len(tables.ib[0]), self.field.shape[1]), dtype=self.field.dtype)
         put_together(every, self.n, tables.ia[0], tables.ib[0], tables.ic[0], tables.is_[0])
-        self._every, self._at, self._grouped = every, patterns.at, patterns.grouped
+        self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
         self.ways: dict[tuple[int, Any], Any] = {}  # out of its phase, of each element in a combination of its group
@@ -261,7 +262,8 @@ class Rows(Assembler):
         for k, part in enumerate(self.parts):
             if part.element.held:
                 felt[k] |= self.rate(k, self.mode).values[: self.n] != 0.0
-        groups = self._grouped(felt @ acts.T)
+        speaks = np.array([[other.name in vars(part.element).values() for other in self.parts] for part in self.parts])
+        groups = linked(felt @ acts.T | speaks)
         return [(some, itemgetter(*some), np.flatnonzero(acts[some].any(axis=0))) for some in groups]
 
     @cached_property
