@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NEEDS = "silverbox_SNLS80mV.csv.gz"
 RATE, FINER, TEST = 610.35, 8, 40_000
-FITTED = slice(40_700, 43_700)
+FIRST = 40_700
 
 
 def measured() -> np.ndarray:
@@ -53,15 +53,16 @@ def finer(V1: np.ndarray) -> ns.Input:
     return ns.Input(np.arange(FINER * len(V1)) / (FINER * RATE), resample_poly(V1, FINER, 1), delay="late")
 
 
-def main() -> Figure:
+def main(samples: int = 3000) -> Figure:
     """Fit 3000 samples, predict the 40 000 of the test."""
     import matplotlib.pyplot as plt
 
     V1, V2 = measured().T
+    fitted = slice(FIRST, FIRST + samples)
     t = np.arange(len(V1)) / RATE
     system, drive = oscillator(), {"V1": finer(V1)}
     found = ns.fit(
-        system, {"V2": (t[FITTED], V2[FITTED])}, list(system.values), measured=["V2"], inputs=drive, progress=False
+        system, {"V2": (t[fitted], V2[fitted])}, list(system.values), measured=["V2"], inputs=drive, progress=False
     )
     print(found)
     run = ns.simulate(

@@ -24,6 +24,7 @@ SHORTER = {
     "control_based_continuation": ("step=0.3, points=60", "step=0.3, points=3"),
     "sketches_and_animations": ("seconds=5, rate=12", "seconds=0.5, rate=12"),
     "smoothing": ("np.geomspace(1e-4, 1e-1, 7)", "np.geomspace(1e-4, 1e-1, 3)"),
+    "uncertainty": ("draws=60", "draws=12"),
 }
 LONG = [page for page in PAGES if page.stem in SHORTER]
 
