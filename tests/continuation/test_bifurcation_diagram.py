@@ -163,3 +163,44 @@ def test_periods_1_2_and_4_of_a_wall_with_rest_come_from_one_graze() -> None:
     for branch in range(3):
         grazes = at[(kinds == "grazing") & (found["special_branch"].values == branch)]
         assert np.abs(grazes - touched).min() < 1e-9
+
+
+def test_flips_of_all_branches_lead_on_where_elements_decide_together(tmp_path: Path) -> None:
+    """Modes and transitions are numbered as they are found, and each branch found its own: orbits of twice the period
+    come back in a simulation, from flips of branches that leave others too."""
+    stop = ns.elements.Stop
+    system = ns.mechanical(
+        np.eye(2),
+        0.1 * np.eye(2),
+        [[2.0, -1.0], [-1.0, 2.0]],
+        coordinates=["x", "y"],
+        forcing={"x": lambda t, p: np.cos(p.w * t)},
+        parameters={"w": 2.3},
+        elements={
+            "stop": stop(at="x", position=0.5, restitution=0.7),
+            "rub": ns.elements.Coulomb(at="y", friction=0.1),
+            "low": stop(at="y", side=-1, position=-0.6, restitution=0.6),
+        },
+    )
+    whole = ns.bifurcation_diagram(
+        system, "w", (2.0, 2.45), n=12, depth=1, max_period=4, points=110, transient=200, progress=False
+    )
+    found = ns.load(ns.save(whole, tmp_path / "diagram.nc"))
+    special, seen = ns.special_points(found), set()
+    for i in np.flatnonzero(special["kind"].values == "flip"):
+        row = special.isel(special=int(i))
+        w, parent = float(row["w"]), int(found["special_branch"][i])
+        if any(abs(w - other) < 1e-6 for other in seen) or (parent == 0 and len(seen) > 1):  # where a branch begins
+            continue
+        seen.add(w)
+        branch = ns.continue_orbit(row, "w", (w - 0.002, w + 0.002), points=8)
+        assert int(branch["period_number"]) == 2 * int(found["period_number"][parent])
+        point = branch.isel(point=branch.sizes["point"] // 2)
+        run = ns.simulate(
+            system.with_parameters(w=float(point["w"])),
+            duration=float(point["period"]),
+            start=point["section"].values,
+            mode=point["mode"].attrs["flag_meanings"].split()[int(point["mode"])],
+        )
+        assert run["u"].values[-1] == pytest.approx(point["section"].values, abs=1e-8)
+    assert len(seen) > 1

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.arguments import LargestStep, limits
 from nonsmooth.continuation.branches.other_branches import SWITCHES
-from nonsmooth.continuation.branches.reading import read_branch
+from nonsmooth.continuation.branches.reading import read_branch, renumbered
 from nonsmooth.continuation.continue_orbit import continue_orbit
 from nonsmooth.continuation.find import find_orbit
 from nonsmooth.continuation.problems.shooting import Shooting
@@ -249,7 +249,8 @@ def _dataset(
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
-    labels = labels_of(system)
+    parts = ((renumbered(one.data, system), one.returns, one.parent) for one in found)
+    branches, returns, parents = zip(*parts, strict=True)
+    labels = labels_of(system)  # with the modes of all branches
     attrs = dict(provenance(labels, "bifurcation_diagram", options, method="multiple shooting"))
-    branches, returns, parents = zip(*((one.data, one.returns, one.parent) for one in found), strict=True)
     return diagram(labels, attrs, name, branches, returns, parents, swept, complete)

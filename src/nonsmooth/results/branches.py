@@ -224,6 +224,7 @@ def diagram(
         compat="override",
     )
     result["signature"].attrs |= flag_attributes(list(known["signature"]), dtype=np.int32)
+    result["mode"].attrs |= flag_attributes(labels.modes, dtype=result["mode"].dtype)
     of_sweeps = {name: swept[name].transpose("direction", parameter, ...) for name in ("section", "period_number")}
     given: dict[str, Any] = {
         "period_number": [int(one["period_number"]) for one in branches],

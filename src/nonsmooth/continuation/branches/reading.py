@@ -182,6 +182,14 @@ def layouts_of(dataset: xr.Dataset, system: System) -> list[Signature]:
     return found
 
 
+def renumbered(dataset: xr.Dataset, system: System) -> xr.Dataset:
+    """A branch with the numbers that modes and transitions have in ``system``: those found on the way differ."""
+    layouts = layouts_of(dataset, system)
+    modes = [layouts[i].visits[0].mode for i in dataset["layout"].values]
+    renamed = dataset.assign(mode=dataset["mode"].copy(data=np.array(modes, dtype=dataset["mode"].dtype)))
+    return renamed.assign_attrs(layout_attributes(layouts, system))
+
+
 def _points(dataset: xr.Dataset, system: System, name: str, period_number: int) -> list[PointRecord]:
     """The points of a branch, or the one of a row; each has as many unknowns as its signature."""
     from nonsmooth.results.branches import ORBIT
