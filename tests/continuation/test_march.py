@@ -299,3 +299,18 @@ def test_a_residual_that_the_last_step_s_square_leaves_is_no_rounding(start: flo
     assert found is not None
     x, p = found[0].X
     assert min(abs(x), abs(x + 2 * p)) < 1e-12
+
+
+@pytest.mark.parametrize("slope", [-1.0, -0.5, 0.3, 1.0, 3.5])
+@pytest.mark.parametrize("bend", [0.0, 0.4])
+def test_the_tangent_at_a_crossing_is_that_of_the_branch(slope: float, bend: float) -> None:
+    """(x - 2 p - b p^2) (x - s p) = 0: along the first factor dx / dp = 2 at the crossing, at any angle between both."""
+
+    def f(x: float, p: float) -> tuple[float, float, float]:
+        one, other = x - 2 * p - bend * p * p, x - slope * p
+        return one * other, one + other, -(2 + 2 * bend * p) * other - slope * one
+
+    found = run(Plane(f), -1.0 + 0.25 * bend, -0.5, 1.0, low=-0.5, high=0.6)
+    (crossing,) = [one.point for one in found.special if one.kind != "zero"]
+    assert crossing.X == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert crossing.tangent[0] * 2.0 / (crossing.tangent[1] * 0.5) == pytest.approx(2.0, abs=1e-6)

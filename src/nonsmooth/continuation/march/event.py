@@ -164,8 +164,10 @@ class BranchPoint(Event):
         Y = branch_point(curve, point.Y)
         if Y is None or np.abs(Y - point.Y).max() > max(float(np.abs(b.Y - a.Y).max()), ABOUT):
             return there
-        # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
-        exact = curve.described(Point(curve, Y, point.tangent, point.orientation, point.iterations, curve.evaluate(Y)))
+        # Any direction in the plane of both branches is null here: of their own that along the step is this branch's.
+        both, along = tangents(curve, Y), a.tangent + b.tangent
+        tangent = point.tangent if both is None else max((*both, *-both), key=lambda one: float(one @ along))
+        exact = curve.described(Point(curve, Y, tangent, point.orientation, point.iterations, curve.evaluate(Y)))
         return there if exact is None else (a.along(Y), exact)
 
 
