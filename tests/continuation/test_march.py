@@ -304,7 +304,7 @@ def test_a_residual_that_the_last_step_s_square_leaves_is_no_rounding(start: flo
 @pytest.mark.parametrize("slope", [-1.0, -0.5, 0.3, 1.0, 3.5])
 @pytest.mark.parametrize("bend", [0.0, 0.4])
 def test_the_tangent_at_a_crossing_is_that_of_the_branch(slope: float, bend: float) -> None:
-    """(x - 2 p - b p^2) (x - s p) = 0: along the first factor dx / dp = 2 at the crossing, at any angle between both."""
+    """(x - 2 p - b p^2) (x - s p) = 0: along the first factor dx / dp = 2 at the crossing, at any angle."""
 
     def f(x: float, p: float) -> tuple[float, float, float]:
         one, other = x - 2 * p - bend * p * p, x - slope * p
