@@ -204,3 +204,32 @@ def test_flips_of_all_branches_lead_on_where_elements_decide_together(tmp_path: 
         )
         assert run["u"].values[-1] == pytest.approx(point["section"].values, abs=1e-8)
     assert len(seen) > 1
+
+
+def test_an_orbit_is_passed_once_whichever_forcing_period_its_section_lies_in() -> None:
+    """Orbits of periods 2 and 4 come to the graze of that of period 1: each special point stands once.
+
+    The four sections of an orbit of period 4 are one orbit."""
+    load, drive = [0.4371315138602859, -0.06688842597629152], [0.48892271, 1.47254339]
+    system = ns.mechanical(
+        np.diag([1.6933635910736706, 0.6133068347971444]),
+        [[0.4397375863947991, -0.3381872521013181], [-0.3381872521013181, 0.5166167700680909]],
+        [[3.7624513737049705, -2.893573646205747], [-2.893573646205747, 4.4202395618658965]],
+        coordinates=["a", "b"],
+        forcing={
+            q: lambda t, p, i=i: load[i] + drive[i] * np.cos(p.w * t + 5.464143150850392) for i, q in enumerate("ab")
+        },
+        parameters={"w": 0.847222},
+        elements={
+            "between": ns.elements.Stop(at={"a": 1.0, "b": -1.0}, position=0.6364550129610025, restitution=0.2),
+            "rail": ns.elements.Coulomb(at="b", friction=0.2039125456, static=0.315881816),
+        },
+    )
+    orbit = ns.find_orbit(system, start=[0.9038, 0.80097, 2.5446, 2.095], transient=0, period_number=2)
+    doubled = ns.special_points(ns.continue_orbit(orbit, "w", (0.64393, 0.8712)))
+    at = {kind: doubled["w"].values[doubled["kind"].values == kind] for kind in ("flip", "grazing")}
+    row = doubled.isel(special=int(np.flatnonzero(doubled["w"].values == at["flip"].min())[0]))
+    special = ns.special_points(ns.continue_orbit(row, "w", (0.64393, 0.8712)))
+    inner = special["w"].values[np.abs(special["w"].values - at["grazing"].min()) > 1e-10]
+    assert np.diff(np.sort(inner)).min() > 1e-9
+    assert np.abs(special["w"].values - at["grazing"].min()).min() < 1e-9

@@ -114,7 +114,7 @@ def test_a_branch_jumps_only_where_no_orbit_comes_nearer(jump: float, monkeypatc
         "_left": lambda point, other: other.left,
         "_may_jump": lambda *sides: True,
         "_leads_back": lambda point, other: False,
-        "_came_by": lambda other, passed: False,
+        "_came_by": lambda point, other, passed: False,
     }.items():
         monkeypatch.setattr(neighbours, name, stand_in)
     taken: Any = neighbours.beside(SimpleNamespace(tangent=np.array([1.0])))  # type: ignore[arg-type]

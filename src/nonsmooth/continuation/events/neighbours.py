@@ -36,7 +36,6 @@ BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has
 EXACT = 1e-9  # of the orbit's size: orbits that meet are as near as this
 JUMP = 1e-6  # of the orbit's size: as far it jumps where an impact becomes slow enough to be completed as rest
 ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same
-SAME = 1e-9  # in scaled unknowns: two solutions as near as this are one
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
@@ -59,7 +58,7 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
                 apart, left = _apart(point, found), _left(point, found)
                 arrives = left <= SHRINKS * apart + EXACT or _shrink([*before, apart])
                 jumps = side == forward and left <= JUMP and _may_jump(point, found)
-                if (arrives or jumps) and not (_leads_back(point, found) or _came_by(found, passed)):
+                if (arrives or jumps) and not (_leads_back(point, found) or _came_by(point, found, passed)):
                     found = found if side * found.rise >= 0.0 else found.turned()
                     if arrives and (ahead is None or left < NEARER * ahead[0]):
                         return found
@@ -70,8 +69,8 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
         return ahead[1]
     if not point.shooting.forced:  # behind a centre orbits of any size are closed
         return None
-    beginnings = (found for found in _along(common) if not (_leads_back(point, found) or _came_by(found, passed)))
-    return next(beginnings, None)
+    others = (one for one in _along(common) if not (_leads_back(point, one) or _came_by(point, one, passed)))
+    return next(others, None)
 
 
 def _along(common: list[Common]) -> Iterator[OrbitPoint]:
@@ -161,16 +160,22 @@ def _leads_back(point: OrbitPoint, found: OrbitPoint) -> bool:
     if (found.value - point.value) * point.rise > 0.0:
         return False
     own = point.curve.at_parameter(point.Y, found.value)
-    return own is not None and _apart(own, found) < BACK * _apart(point, found) + ROUNDING
+    return own is not None and _is_same(point, own, found)
 
 
-def _came_by(found: OrbitPoint, passed: Sequence[OrbitPoint]) -> bool:
-    """Return whether an orbit is one of those between the points of the branch so far."""
+def _came_by(point: OrbitPoint, found: OrbitPoint, passed: Sequence[OrbitPoint]) -> bool:
+    """Return whether an orbit is one of those between the points of the branch so far, in whichever forcing period its
+    section lies."""
+    cycle, seen = found.signature.cycle, found.curve.seen(found)
     for a, b in pairwise(passed):
-        if a.curve is b.curve and a.signature == found.signature:
-            Y = found.X / a.curve.scale
-            if passing(Y, a.Y, b.Y) is not None:
-                there = a.curve.between(a, b, a.along(Y))
-                if there is not None and np.abs(there.Y - Y).max() < SAME:
-                    return True
+        if a.curve is b.curve and a.signature.cycle == cycle:
+            x = passing(seen, a.curve.seen(a), b.curve.seen(b))
+            own = None if x is None else a.curve.at_parameter(a.Y + x * (b.Y - a.Y), found.value)
+            if own is not None and _is_same(point, own, found):
+                return True
     return False
+
+
+def _is_same(point: OrbitPoint, own: OrbitPoint, found: OrbitPoint) -> bool:
+    """Return whether two orbits near ``point`` are one."""
+    return _apart(own, found) < BACK * _apart(point, found) + ROUNDING
