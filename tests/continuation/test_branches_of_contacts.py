@@ -130,3 +130,66 @@ def test_a_speed_that_was_held_is_zero_where_the_block_leaves_its_belt() -> None
     )
     branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "A", (0.5, 1.05))
     assert branch["ended"].values.tolist() == [0, 0]
+
+
+@pytest.mark.physics
+def test_stops_out_of_reach_change_nothing() -> None:
+    """Two masses, one of them with friction: its sliding bifurcations are those beside stops that are never met, with
+    which modes are made when they are visited."""
+
+    def special(*stops: int) -> xr.Dataset:
+        walls = {f"wall_{k + 1}": ns.elements.Stop(at="a", side=k, position=4.0 * k, restitution=0.6) for k in stops}
+        system = ns.mechanical(
+            np.eye(2),
+            0.1 * np.eye(2),
+            [[2.0, -1.0], [-1.0, 2.5]],
+            parameters={"w": 0.42},
+            coordinates=["a", "b"],
+            forcing={"a": lambda t, p: np.cos(p.w * t)},
+            elements={"rub": ns.elements.Coulomb(at="a", friction=0.05), **walls},
+        )
+        return ns.special_points(ns.continue_orbit(ns.find_orbit(system, transient=300), "w", (0.33, 0.45)))
+
+    alone, beside = special(), special(1, -1)
+    names = ["grazing_sliding", "adding_sliding", "switching_sliding", "grazing_sliding"]
+    assert beside["sliding"].values.tolist() == alone["sliding"].values.tolist() == names
+    assert (
+        beside["kind"].values.tolist() == alone["kind"].values.tolist() == ["grazing", "grazing", "corner", "grazing"]
+    )
+    np.testing.assert_allclose(beside["w"], alone["w"], rtol=0, atol=1e-9)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize(("masses", "at"), [(1, 0.5), (2, 0.4)])
+def test_a_soft_stop_flush_with_a_wall_is_never_pressed(masses: int, at: float) -> None:
+    """A spring that begins where a rigid wall stands closes, is struck and opens at one instant: orbit, multipliers and
+    branch are those of the wall alone."""
+
+    def branch(*soft: float) -> xr.Dataset:
+        elements: dict[str, Any] = {}
+        for q in ("a", "b")[:masses]:
+            for side in (1, -1)[:masses]:
+                for k in soft:
+                    spring = ns.elements.ElasticStop(at=q, side=side, position=k * side, stiffness=20.0)
+                    elements[f"soft_{q}_{side + 1}"] = spring
+                wall = ns.elements.Stop(at=q, side=side, position=at * side, restitution=0.7)
+                elements[f"wall_{q}_{side + 1}"] = wall
+        system = ns.mechanical(
+            np.eye(masses),
+            0.1 * np.eye(masses),
+            [[1.0]] if masses == 1 else [[2.0, -1.0], [-1.0, 2.5]],
+            parameters={"w": 0.9 if masses == 1 else 1.1},
+            coordinates=["a", "b"][:masses],
+            forcing={"a": lambda t, p: np.cos(p.w * t)},
+            elements=elements,
+        )
+        return ns.continue_orbit(ns.find_orbit(system, transient=300), "w", (0.8, 1.0) if masses == 1 else (1.07, 1.13))
+
+    alone, flush = branch(), branch(at)
+    assert flush["ended_because"].values.tolist() == alone["ended_because"].values.tolist()
+    assert flush.sizes["special"] == alone.sizes["special"] == 0
+    for point in (0, -1):
+        mine, its = (one.isel(point=point) for one in (alone, flush))
+        np.testing.assert_allclose(its["section"], mine["section"], rtol=0, atol=1e-9)
+        moduli = [np.sort(np.abs(one["floquet_multipliers"].values)) for one in (mine, its)]
+        np.testing.assert_allclose(*moduli, rtol=0, atol=1e-7)

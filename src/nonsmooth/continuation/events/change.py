@@ -198,7 +198,7 @@ def is_tolerance(point: OrbitPoint, indicator: int, among: Sequence[TracedTransi
     flow, values = point.shooting.flow, point.shooting.values
     z = np.linspace(0.3, 0.7, flow.n) * flow.scale
     for jump in among or flow.traced.transitions:
-        for row, other in permutations(jump.rows, 2):
+        for row, other in permutations(jump.rows[1:], 2):
             if row.indicator != indicator or row.sign * other.sign >= 0:
                 continue
             one, two = (flow.indicator(values, each.indicator, jump.source, 0.0, z) for each in (other, row))

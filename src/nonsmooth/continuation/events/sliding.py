@@ -99,8 +99,12 @@ def _moves(point: OrbitPoint, ends: _Stay) -> bool:
 def _slides(point: OrbitPoint, ends: _Stay, mode: int) -> bool:
     """Return whether motion in a mode stays on the surface at which another visit ends.
 
-    Its rate vanishes there, whatever the state: the rate's gradient is a multiple of the surface's."""
-    indicator = point.shooting.system.traced.transitions[ends.transition].rows[ends.row].indicator
+    Its rate vanishes there, whatever the state: the rate's gradient is a multiple of the surface's. Of patterns, whose
+    elements have no condition where they hold, those that hold say so."""
+    traced = point.shooting.system.traced
+    indicator, patterns = traced.transitions[ends.transition].rows[ends.row].indicator, traced.patterns
+    if patterns is not None:
+        return patterns.owners[indicator] in patterns.make.held(patterns.visited[mode])
     at = point.shooting.flow.indicator(point.values, indicator, mode, ends.t, ends.z)
     h, rate = np.append(at.h_z, at.h_t), np.append(at.L_z, at.L_t)
     along = rate - h * float(rate @ h) / max(float(h @ h), 1e-300)

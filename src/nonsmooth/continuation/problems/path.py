@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.continuation.problems.signature import AT_ONCE
 from nonsmooth.system.symbolic.traced import FOUND
 
@@ -104,16 +104,19 @@ class Walk:
         sources = np.array([jump.source for jump in jumps], dtype=np.int64)
         fires = np.array([jump.fires for jump in jumps], dtype=bool) & (self.net.at < 0)
         self.armed = (sources == self.modes[:, None]) & fires
+        surface, conditions = _surfaces(traced)
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
         for i, (k, r) in enumerate(zip(self.fired, self.fired_row, strict=True)):
             if k >= 0:  # of those behind it none is taken that holds wherever it does, or by the condition that fires
-                own, fires_by = set(jumps[k].rows), jumps[k].rows[r - self.net.row_start[k]] if r >= 0 else None
-                taken = [bool(jump.rows) and (set(jump.rows) <= own or fires_by in jump.rows) for jump in jumps[k:]]
+                own, fires_by = set(conditions[k]), conditions[k][r - self.net.row_start[k]] if r >= 0 else None
+                taken = [bool(other) and (set(other) <= own or fires_by in other) for other in conditions[k:]]
                 self.elsewhere[i, k] = False
                 self.elsewhere[i, k:] &= ~np.array(taken, dtype=bool)
             if traced.asks and r >= 0:  # what several decide fires with what one does, of its own or of their condition
-                fired = [one == traced.indicators[self.net.rows[r, 0]] for one in traced.indicators]
-                self.elsewhere[i] &= [not any(fired[one.indicator] for one in j.rows) for j in jumps]
+                fired = surface[self.net.rows[r, 0]]
+                self.elsewhere[i] &= [all(surface[one.indicator] != fired for one in j.rows) for j in jumps]
+            if traced.patterns is not None and (r >= 0 or visits[i].row == AT_ONCE):
+                self.elsewhere[i] = False  # no expression tells which conditions are one: a run sees what else happens
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
         self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
         fixed = [shooting.forced]
@@ -127,12 +130,15 @@ class Walk:
             if self.at_once[i - 1]:
                 self.crossed[i] = self.crossed[i - 1]
             elif self.fired_row[i - 1] >= 0:
-                self.crossed[i, self.net.rows[self.fired_row[i - 1], 0]] = True
+                self.crossed[i] = surface == surface[self.net.rows[self.fired_row[i - 1], 0]]
         for i in map(int, np.flatnonzero(shooting.divided)):  # the exit lies in the surface of the entry
             self.crossed[i, self.net.rows[self.fired_row[i], 0]] = True
-        for i in range(m):  # of conditions that hold together the first is taken
+        for i in range(
+            m
+        ):  # of conditions that hold together the first is taken; what was crossed at the instant is zero
             if self.at_once[i]:
                 self.elsewhere[i, self.fired[i] :] = False
+                self.elsewhere[i] &= [not any(self.crossed[i, one.indicator] for one in jump.rows) for jump in jumps]
         self.inside = self.conditional, self.fired[self.conditional]
         # No corner to watch: the other rows vanish with it, or belong to what stands in the table for an answer.
         answers = [jumps[self.fired[i]].rows != jumps[visits[i].transition].rows for i in self.conditional]
@@ -238,6 +244,24 @@ class Walk:
             if not found[i] <= distance:
                 found[i] = distance
         return found
+
+
+@lru_cache(maxsize=16)
+def _surfaces(traced: Traced) -> tuple[IntArray, list[list[tuple[int, int, bool]]]]:
+    """For each indicator the first one that vanishes where it does, by their expressions where they have any; and the
+    conditions of all transitions by these."""
+    first, same = dict[Any, tuple[int, int]](), list[tuple[int, int]]()
+    for i, one in enumerate(traced.indicators):
+        if getattr(one, "free_symbols", ()):
+            same.append(first.setdefault(one, (i, 1)))
+            first.setdefault(-one, (i, -1))
+        else:
+            same.append((i, 1))
+    rows = [
+        [(same[one.indicator][0], one.sign * same[one.indicator][1], one.strict) for one in jump.rows]
+        for jump in traced.transitions
+    ]
+    return np.array([at for at, _ in same], dtype=np.int64), rows
 
 
 def _in_net(traced: Traced, net: Any, k: int, row: int) -> tuple[int, int]:

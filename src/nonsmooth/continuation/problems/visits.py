@@ -8,6 +8,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
+from nonsmooth.continuation.problems.surfaces import one_surface
 from nonsmooth.flow.saltation import BEHIND
 from nonsmooth.system.symbolic.traced import ALONE, FOUND
 
@@ -25,7 +26,7 @@ def visits_of(
 
     ``memory`` is that before the first of them. The row of each condition is the one that is zero."""
     flow.catch_up()
-    traced = flow.traced
+    traced, instant = flow.traced, _AtOnce(values[list(flow.places)])
     visits = []
     for i in range(first, len(log.crossing_transition)):
         k, t = int(log.crossing_transition[i]), float(log.crossing_time[i])
@@ -33,14 +34,41 @@ def visits_of(
         if jump.at is not None:
             turn = round(t / flow.period(values)[0] - flow.phase(values, k)[0])
             visits.append(Visit(jump.source, k, -1, turn))
+            instant.surface = None
         else:
             before = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
             same = i > 0 and t == float(log.crossing_time[i - 1])
             row = _fired_row(flow, values, k, t, before, same)
+            follows = instant.follows(flow.jump(values, k, t, before, max(row, -1)), t, before, same)
+            row = AT_ONCE if follows else row
             visits.append(Visit(jump.source, *_alone(flow, values, k, row, t, before)))
         memory = log.memory_after[i]
     after = np.concatenate([np.nan_to_num(log.u_after[first:]), log.memory_after[first:]], axis=1)
     return visits, after.reshape(len(visits), flow.n)
+
+
+class _AtOnce:
+    """Transitions of one instant: a later one whose surface is that of the first, as the maps between them lead on,
+    follows it at once whatever the states, the time and the active parameters."""
+
+    surface: FloatArray | None = None  # gradient of the first one's, in states, active parameters and time
+
+    def __init__(self, active: FloatArray) -> None:
+        self.active = active
+
+    def follows(self, jump: Jump, t: float, z: FloatArray, same: bool) -> bool:
+        """Return whether a transition follows the first of its instant: if not of the ``same``, it is the first."""
+        place, n = np.concatenate([z, self.active, [t]]), jump.n
+        surface = np.concatenate([jump.h_z, jump.h_p, [jump.h_t]])
+        if not same:
+            self.surface, self.h, self.place, self.led = surface, jump.h, place, np.eye(len(place))
+        elif self.surface is None:
+            return False
+        found = same and one_surface(self.surface, self.h, surface @ self.led, jump.h, self.place)
+        through = np.eye(len(place))
+        through[:-1, :-1], through[:n, -1] = jump.R, jump.R_t
+        self.led = through @ self.led
+        return found
 
 
 def _fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
