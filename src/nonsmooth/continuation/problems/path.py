@@ -133,9 +133,8 @@ class Walk:
                 self.crossed[i] = surface == surface[self.net.rows[self.fired_row[i - 1], 0]]
         for i in map(int, np.flatnonzero(shooting.divided)):  # the exit lies in the surface of the entry
             self.crossed[i, self.net.rows[self.fired_row[i], 0]] = True
-        for i in range(
-            m
-        ):  # of conditions that hold together the first is taken; what was crossed at the instant is zero
+        # Of conditions that hold together the first is taken; what was crossed at the instant is zero.
+        for i in range(m):
             if self.at_once[i]:
                 self.elsewhere[i, self.fired[i] :] = False
                 self.elsewhere[i] &= [not any(self.crossed[i, one.indicator] for one in jump.rows) for jump in jumps]
