@@ -194,7 +194,8 @@ def is_tolerance(point: OrbitPoint, indicator: int, among: Sequence[TracedTransi
     """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
 
     It differs from another one of its condition, with the other sign, by a small number, in one ``among`` transitions
-    (none given: in any)."""
+    (none given: in any). A transition's first row is what it fires by: of a slip that turns, and is complete a little
+    later, that is no tolerance."""
     flow, values = point.shooting.flow, point.shooting.values
     z = np.linspace(0.3, 0.7, flow.n) * flow.scale
     for jump in among or flow.traced.transitions:

@@ -39,8 +39,9 @@ def visits_of(
             before = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
             same = i > 0 and t == float(log.crossing_time[i - 1])
             row = _fired_row(flow, values, k, t, before, same)
-            follows = instant.follows(flow.jump(values, k, t, before, max(row, -1)), t, before, same)
-            row = AT_ONCE if follows else row
+            if same or t in log.crossing_time[i + 1 : i + 2]:
+                follows = instant.follows(flow.jump(values, k, t, before, max(row, -1)), t, before, same)
+                row = AT_ONCE if follows else row
             visits.append(Visit(jump.source, *_alone(flow, values, k, row, t, before)))
         memory = log.memory_after[i]
     after = np.concatenate([np.nan_to_num(log.u_after[first:]), log.memory_after[first:]], axis=1)
