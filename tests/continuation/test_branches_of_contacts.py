@@ -193,3 +193,33 @@ def test_a_soft_stop_flush_with_a_wall_is_never_pressed(masses: int, at: float) 
         np.testing.assert_allclose(its["section"], mine["section"], rtol=0, atol=1e-9)
         moduli = [np.sort(np.abs(one["floquet_multipliers"].values)) for one in (mine, its)]
         np.testing.assert_allclose(*moduli, rtol=0, atol=1e-7)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("rest", ["gap < 0 and closing < 0 and slow > 0", "closing < 0 and slow > 0 and gap < 0"])
+def test_how_many_impacts_come_before_rest_is_no_special_point_in_any_order_of_conditions(rest: str) -> None:
+    """Of a mass that bounces to rest on a wall, written as modes: below a speed of 1e-7 an impact is completed as rest,
+    and their number changes along the branch; the motion does not."""
+    system = ns.System(
+        states={"q": "1", "v": "1"},
+        parameters={"w": 0.35},
+        modes={
+            "flight": lambda t, u, p: (u.v, np.cos(p.w * t) - 0.1 * u.v - u.q),
+            "rest": lambda t, u, p: (0.0 * u.q, 0.0 * u.v),
+        },
+        indicators={
+            "gap": lambda t, u, p: 0.5 - u.q,
+            "closing": lambda t, u, p: -u.v,
+            "slow": lambda t, u, p: 1e-7 - u.v,
+            "opens": lambda t, u, p: np.cos(p.w * t) - u.q,
+        },
+        transitions=[
+            ns.Transition("flight", "flight", when="gap < 0 and slow < 0", reset=lambda t, u, p: (u.q, -0.5 * u.v)),
+            ns.Transition("flight", "rest", when=rest, reset=lambda t, u, p: (u.q, 0.0)),
+            ns.Transition("rest", "flight", when="opens < 0"),
+        ],
+    )
+    orbit = ns.find_orbit(system, transient=60, start={"q": 0.0, "v": 0.0})
+    branch = ns.continue_orbit(orbit, "w", (0.3, 0.4))
+    assert [branch["w"].values.min(), branch["w"].values.max()] == pytest.approx([0.3, 0.4])
+    assert len(np.unique(branch["crossings_per_period"])) > 1 and branch.sizes["special"] == 0
