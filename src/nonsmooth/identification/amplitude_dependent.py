@@ -28,7 +28,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.blas import one_blas_thread
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.nonlinear_mode import FEWEST_CURVES, NonlinearMode, ResponseFit, interpolation
 from nonsmooth.recordings.recording import Recording

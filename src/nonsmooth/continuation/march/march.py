@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.blas import one_blas_thread
 from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
 from nonsmooth.continuation.problems.curve import Place, Point, passing
 
@@ -128,6 +129,7 @@ class Policy(ABC):
         return "no_convergence"
 
 
+@one_blas_thread()
 def march(point: Any, limits: Limits, policy: Policy) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()

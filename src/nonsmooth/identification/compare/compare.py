@@ -8,9 +8,9 @@ from typing import Any, Literal, Unpack
 import numpy as np
 import xarray as xr
 
+from nonsmooth.blas import one_blas_thread
 from nonsmooth.errors import check_keys
 from nonsmooth.flow.options import solver_of
-from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.fit.steady import is_steady, of_table

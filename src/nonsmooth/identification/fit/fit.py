@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal, Unpack
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.blas import one_blas_thread
 from nonsmooth.errors import SolveError, check_keys
 from nonsmooth.flow.starts import is_one_start, start_states
-from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.fit.beginnings import beginnings, drawn
 from nonsmooth.identification.fit.first_level import Stage, level, read_modes, without_disagreeing
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, states_from_samples

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.blas import one_blas_thread
 from nonsmooth.errors import SolveError, check_keys
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.identification.arrow import concerned, inverted, reduced
-from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.fit import problem_of
 from nonsmooth.identification.fit.sensors import read_sensors

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.blas import one_blas_thread
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.fit.first_windows import first_length
 from nonsmooth.identification.fit.fit import best_of, problem_of
 from nonsmooth.identification.fit.growth import Grown

@@ -1,4 +1,4 @@
-"""One thread for the linear algebra of fits: their matrices are tiny, and threads would wait for each other."""
+"""One thread for the linear algebra of fits and branches: matrices are small, and threads would wait for each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The threads of the linear algebra while something is fitted, as the library itself tells them."""
+"""The threads of the linear algebra while something is fitted or followed, as the library itself tells them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 CODE = """
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
-from nonsmooth.identification import blas
+from nonsmooth import blas
 
 def told():
     return [one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"]
@@ -42,11 +42,17 @@ try:
 except KeyError:
     pass
 assert seen == one, seen
+from nonsmooth.continuation.march import march
+march._Marching.__init__ = lambda *a: None
+march._Marching.follow = lambda *a: seen.extend(told() + [0])
+march.march(None, None, None)
+assert seen == 2 * one + [0], seen
+assert told() == two
 """
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core has one thread anyway")
-def test_fits_run_on_one_thread_and_leave_the_setting_as_it_was() -> None:
+def test_fits_and_branches_run_on_one_thread_and_leave_the_setting_as_it_was() -> None:
     plain = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     done = subprocess.run([sys.executable, "-c", CODE], env=plain, capture_output=True, text=True, timeout=600)
     if done.returncode == 77:
