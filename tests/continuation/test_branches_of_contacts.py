@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.elements import Coulomb, Stop
+from nonsmooth.elements import Coulomb, PreloadedSpring, Stop
 
 NAMES = ["F", "mu", "e", "X"]
 
@@ -223,3 +223,52 @@ def test_how_many_impacts_come_before_rest_is_no_special_point_in_any_order_of_c
     branch = ns.continue_orbit(orbit, "w", (0.3, 0.4))
     assert [branch["w"].values.min(), branch["w"].values.max()] == pytest.approx([0.3, 0.4])
     assert len(np.unique(branch["crossings_per_period"])) > 1 and branch.sizes["special"] == 0
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("far", [False, True], ids=["alone", "beside a stop out of reach"])
+def test_a_preloaded_spring_has_the_special_points_of_two_plain_modes(far: bool) -> None:
+    """The conditions by which a contact is left (fast, or slow against a load) are no events: the same mass written as
+    two modes with one condition each has two special points here."""
+
+    def pulled(t: Any, p: Any) -> Any:
+        return p.f * np.cos(p.w * t) - 0.03
+
+    def side(sign: int) -> Callable[..., Any]:
+        return lambda t, u, p: (u.v, pulled(t, p) - 0.4 * u.v - 16.5 * u.q - 0.29 * sign)
+
+    def period(p: Any) -> Any:
+        return 2 * np.pi / p.w
+
+    values = {"w": 1.84, "f": 1.21}
+    plain = ns.System(
+        states=["q", "v"],
+        parameters=values,
+        modes={"above": side(1), "below": side(-1)},
+        indicators={"side": lambda t, u, p: u.q},
+        transitions=[
+            ns.Transition("above", "below", when="side < 0"),
+            ns.Transition("below", "above", when="side > 0"),
+        ],
+        period=period,
+    )
+    elements: dict[str, Any] = {"spring": PreloadedSpring(at="q", preload=0.29, stiffness=12.5)}
+    if far:
+        elements["far"] = Stop(at="q", position=50.0, restitution=0.5)
+    sprung = ns.mechanical(
+        1.0,
+        0.4,
+        4.0,
+        parameters=values,
+        forcing={"q": pulled},
+        elements=elements,
+        coordinates=["q"],
+        period=period,
+    )
+    found = []
+    for system in (plain, sprung):
+        branch = ns.continue_orbit(ns.find_orbit(system, transient=200), "w", (1.8, 2.2), points=300)
+        at = branch["w"].values[branch["special_point"].values]
+        found.append(sorted(zip(at.tolist(), branch["special_kind"].values.tolist(), strict=True)))
+    assert [kind for _, kind in found[0]] == [kind for _, kind in found[1]] == ["grazing", "grazing"]
+    np.testing.assert_allclose([at for at, _ in found[1]], [at for at, _ in found[0]], rtol=0, atol=1e-9)

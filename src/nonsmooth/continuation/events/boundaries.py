@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from nonsmooth.continuation.events.change import (
     Change,
-    by_others,
     gained,
     inserted,
     is_tolerance,
@@ -96,20 +96,23 @@ class Crossed(Boundary):
     def visit(self, point: Any) -> int:
         """The visit whose crossing it is."""
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
-        """Transition, instant, state, and the row that fires (-1: whichever): those at the end of the visit."""
-        return point.signature.visits[visit].transition, *_end(point, visit), -1
+    def crossing(self, point: Any, visit: int) -> tuple[Sequence[int], float, Any, int]:
+        """Transitions, instant, state, and the indicator that fires (-1: any): those at the end of the visit."""
+        return [point.signature.visits[visit].transition], *_end(point, visit), -1
 
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the row that is nearest to zero (-1: of none)."""
         visit, shooting = self.visit(point), point.shooting
-        k, t, z, fires = self.crossing(point, visit)
-        near = []
-        for r, row in enumerate(shooting.system.traced.transitions[k].rows):
-            one = shooting.flow.jump(point.values, k, t, z, r)
-            size = max(float(np.abs(one.h_z) @ point.curve.size), 1e-300)
-            near.append((max(abs(one.h) / size, ON), r, row.indicator))  # of several that are zero the first
-        return min((one for one in near if one[1] != fires), default=(0.0, -1, -1))[-1]
+        transitions, t, z, fires = self.crossing(point, visit)
+        near: list[tuple[float, int, int]] = []  # of several that are zero the first
+        for k in transitions:
+            for r, row in enumerate(shooting.system.traced.transitions[k].rows):
+                one = shooting.flow.jump(point.values, k, t, z, r)
+                size = max(float(np.abs(one.h_z) @ point.curve.size), 1e-300)
+                near.append(
+                    (max(abs(one.h) / size, ON), len(near), row.indicator)
+                )  # of several that are zero the first
+        return min((one for one in near if one[-1] != fires), default=(0.0, -1, -1))[-1]
 
     def instant(self, point: Any) -> tuple[int, float, Any]:
         """In the visit that ends there (a reset that leads there: that begins)."""
@@ -161,20 +164,24 @@ class Own(Crossed):
     """Two rows of the condition that fires vanish together."""
 
     def contacts(self, point: Any) -> list[Change]:
-        """At a tolerance: the same impact by the other transition, and the orbit without it or the last before rest."""
+        """At a tolerance: the same orbit, which may be one a little further on, and that without the impact or without
+        the last before rest."""
         i, surface = self.visit(point), self.surface(point)
         if not is_tolerance(point, surface):
             return []
-        found, count = by_others(point, i, surface), rest_after(point, i)
-        return found if count == 0 else [*found, *without(point, i, count or 1)]
+        same, count = Change(point, point.once, point.once, i, 0, surface, True), rest_after(point, i)
+        return [same] if count == 0 else [same, *without(point, i, count or 1)]
 
     def visit(self, point: Any) -> int:
         """The visit before the crossing with the least other row."""
         return int(point.curve.walk.conditional[int(point.path.own.argmin())])
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
-        """The row that fires is known."""
-        return (*super().crossing(point, visit)[:3], point.signature.visits[visit].row)
+    def crossing(self, point: Any, visit: int) -> tuple[Sequence[int], float, Any, int]:
+        """All that decide whether the transition is taken as its row fires; that row is known."""
+        own = point.signature.visits[visit]
+        deciding = point.curve.walk.deciding.get(visit, [(own.transition, True)])
+        fires = point.shooting.system.traced.transitions[own.transition].rows[own.row].indicator
+        return [k for k, _ in deciding], *_end(point, visit), fires
 
 
 class Grazing(Boundary):
@@ -210,9 +217,9 @@ class Others(Crossed):
         """The visit at whose end it does."""
         return int(point.path.others.argmax())
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[Sequence[int], float, Any, int]:
         """The other transition."""
-        return int(point.path.other[visit]), *_end(point, visit), -1
+        return [int(point.path.other[visit])], *_end(point, visit), -1
 
 
 class Landed(Crossed):
@@ -228,10 +235,10 @@ class Landed(Crossed):
         """The visit that begins there."""
         return int(point.path.landed.argmax())
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[Sequence[int], float, Any, int]:
         """The transition that is reached, where the visit begins."""
         return (
-            int(point.path.landing[visit]),
+            [int(point.path.landing[visit])],
             float(point.solved.times[visit]),
             point.shooting.split(point.X)[1][visit],
             -1,

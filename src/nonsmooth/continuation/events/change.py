@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Solved
-from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
+from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Visit
 from nonsmooth.continuation.problems.visits import anchored, led
 from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced, TracedTransition
 
@@ -54,7 +54,7 @@ def inserted(point: OrbitPoint) -> list[Change]:
     path, flow, values, traced = point.path, point.shooting.flow, point.values, point.shooting.system.traced
     free = point.once
     place, k = path.touched
-    row = int(path.which[place, k] - point.curve.walk.net.row_start[k])
+    k, row = traced.first_alike(k, int(path.which[place, k] - point.curve.walk.net.row_start[k]))
     t, (begin, end) = float(path.place[place, k]), map(float, point.solved.times[place : place + 2])
     if place < point.shooting.m and end - t < TURNS * point.period:
         return []
@@ -75,6 +75,8 @@ def inserted(point: OrbitPoint) -> list[Change]:
             if back.source != jump.target or back.target != jump.source or back.at is not None:
                 continue
             for r in (*range(len(back.rows)), AT_ONCE):
+                if r >= 0 and traced.first_alike(k_back, r)[0] != k_back:
+                    continue
                 leave = flow.jump(values, k_back, t, entry.z_after, r)
                 found.append(change([first, Visit(jump.target, k_back, r)], [entry.z_after, leave.z_after]))
     return found
@@ -121,25 +123,6 @@ def completes(point: OrbitPoint, visit: Visit) -> bool:
     """Return whether a visit ends with an impact so slow that it is completed as rest."""
     jump = point.shooting.system.traced.transitions[visit.transition]
     return visit.row >= 0 and any(is_tolerance(point, row.indicator, (jump,)) for row in jump.rows)
-
-
-def by_others(point: OrbitPoint, place: int, indicator: int) -> list[Change]:
-    """The same orbit where one of its transitions is another one that needs an indicator with the other sign."""
-    jumps, free = point.shooting.system.traced.transitions, point.once
-    visits = free.signature.visits
-    visit = visits[place]
-    own = jumps[visit.transition]
-    fired = own.rows[visit.row]
-    found = []
-    for k, other in enumerate(jumps):
-        turned = any(
-            a.indicator == b.indicator == indicator and a.sign * b.sign < 0.0 for a in own.rows for b in other.rows
-        )
-        if turned and (other.source, other.target) == (own.source, own.target) and fired in other.rows:
-            new = replace(visit, transition=k, row=other.rows.index(fired))
-            signature = Signature((*visits[:place], new, *visits[place + 1 :]))
-            found.append(Change(point, replace(free, signature=signature), free, place, 1, indicator, True))
-    return found
 
 
 def common_orbit(change: Change) -> Common | None:

@@ -92,6 +92,7 @@ def _found(point: OrbitPoint, common: list[Common], side: float, aside: float) -
     values = point.values.copy()
     values[shooting.places] = there = np.array([point.value + side * aside * curve.width])
     tried = Counter({shooting.signature.cycle: AGAIN})
+    tried -= Counter({other.shooting.signature.cycle: AGAIN for other, _, _ in common})
     for guess in _guesses(point, common, values, side * aside):
         for _ in range(ROUNDS):
             if guess is None or tried[guess.signature.cycle] >= AGAIN:

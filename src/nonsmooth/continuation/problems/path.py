@@ -118,6 +118,16 @@ class Walk:
             if traced.patterns is not None and (r >= 0 or visits[i].row == AT_ONCE):
                 self.elsewhere[i] = False  # no expression tells which conditions are one: a run sees what else happens
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
+        #: Of a visit that ends with one of several transitions that are alike: all that decide whether one is taken.
+        self.deciding: dict[int, list[tuple[int, bool]]] = {}
+        for i in map(int, self.conditional):
+            k, among = self.fired[i], np.flatnonzero(self.armed[i]) if traced.patterns is None else ()
+            alike = traced.alike(k, row := self.fired_row[i] - self.net.row_start[k])
+            if len(alike) > 1:
+                fires = jumps[k].rows[row]
+                by = [j for j in {*alike, *among} if j in alike or fires in jumps[j].rows]
+                self.deciding[i] = [(j, j in alike) for j in sorted(by) if alike[0] <= j <= alike[-1]]
+                self.elsewhere[i, alike] = False
         self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
         fixed = [shooting.forced]
         for visit in visits[:-1]:  # at a phase that does not depend on the parameters
@@ -194,6 +204,14 @@ class Walk:
         at = int(np.where(without_sign, 0.0, inner).argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]
+        for i, deciding in self.deciding.items():
+            taken, barred = -np.inf, np.inf
+            for k, alike in deciding:
+                if alike:
+                    taken = max(taken, min(end[i, k], barred))
+                else:
+                    barred = min(barred, -end[i, k])
+            own[np.searchsorted(self.conditional, i)] = taken
         own[self.alone] = np.inf
         if n_t and m > 1:
             rest = np.where(self.elsewhere[:-1], end[:-1], -np.inf)

@@ -86,11 +86,11 @@ def _fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: F
 
 def _alone(flow: VariationalFlow, values: FloatArray, k: int, row: int, t: float, z: FloatArray) -> tuple[int, int]:
     """The transition, and its row, of the one element that acts: others are asked with it where they only happen to be
-    near, and their answer is the same."""
+    near, and their answer is the same. Of transitions that are alike the first."""
     jumps = flow.traced.transitions
     answer = jumps[k]
     if answer.kind != FOUND:
-        return k, row
+        return flow.traced.first_alike(k, row) if row >= 0 else (k, row)
     found = flow.jump(values, k, t, z, row)
     for other, jump in enumerate(jumps):
         if jump.kind == ALONE and (jump.source, jump.target) == (answer.source, answer.target):

@@ -113,7 +113,7 @@ class Margins(NamedTuple):
     begin: Any  # the margin at the beginning of the visit
     begin_row: Any  # the row it stands in
     begin_size: Any  # and the size of that row's terms, and of what they are computed from
-    end: Any  # the margin at the end; for the transition that fires there, without the row that is zero
+    end: Any  # the margin at the end, without the row that fires there
     slope: Any  # (m, 2) of the signed indicator that is zero at the end: time derivative just before it, and value
 
 
@@ -223,7 +223,11 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
                     k = net.mode_list[j]
                     if net.row_start[k + 1] == net.row_start[k]:
                         continue
-                    skipped = fired_row[leg] if fired[leg] == k else -1
+                    skipped = -1
+                    for r in range(net.row_start[k], net.row_start[k + 1]):
+                        f = fired_row[leg]
+                        if f >= 0 and rows[r, 0] == rows[f, 0] and rows[r, 1] == rows[f, 1]:
+                            skipped = r
                     v, _, _ = margin(C, order, n, net, k, h, skipped)
                     end[leg, k] = v
                 if fired_row[leg] >= 0:

@@ -154,6 +154,24 @@ class Traced:
         )
         return {self.t: "t", **dict(zip((*self.u, *self.p, *self.m), names, strict=True))}
 
+    def alike(self, k: int, row: int) -> list[int]:
+        """Transitions that lead to the same mode by the same map as transition ``k`` where the same row fires: their
+        conditions are parts of one."""
+        jump, known = self.transitions[k], self.patterns.changes if self.patterns else []
+        asked = jump.source, jump.target, jump.kind, jump.reset, jump.writes
+        return [
+            j
+            for j, other in enumerate(self.transitions)
+            if (other.source, other.target, other.kind, other.reset, other.writes) == asked
+            and jump.rows[row] in other.rows
+            and (not known or known[j] == known[k])
+        ]
+
+    def first_alike(self, k: int, row: int) -> tuple[int, int]:
+        """The first of the transitions that are alike, and its row that fires."""
+        first = self.alike(k, row)[0]
+        return first, self.transitions[first].rows.index(self.transitions[k].rows[row])
+
     def keeps_at_zero(self, mode: int, indicator: int) -> bool:
         """Return whether motion in a mode slides along the surface of an indicator."""
         return mode < len(self.along) and indicator in self.along[mode]
