@@ -9,7 +9,7 @@ References: JCGM 100:2008 (GUM), 4.3.7 for limits without a distribution, 5.2.2 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -271,6 +271,20 @@ class Finding:
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """The interval that holds the quantity with this probability."""
         return self.estimate.interval(level)
+
+    def to_record(self) -> dict[str, Any]:
+        """Return what a file holds of it, as mappings: all but data and covariance."""
+        return asdict(replace(self, data=None, covariance=None))
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> Finding:
+        """Return the finding of such a record; a number may be a text there, as ``"inf"``."""
+        read = {
+            "estimate": Estimate(**record["estimate"]),
+            "others": {name: Estimate(**one) for name, one in record["others"].items()},
+            **{name: tuple(record[name]) for name in ("runs", "notes")},
+        }
+        return cls(**{**record, **read})
 
     def __str__(self) -> str:
         lines = [f"{self.name} = {self.estimate}", f"  {self.method}", f"  from {self._used()}"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -228,7 +227,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             "n_parameters": len(self.estimates),
             "identifiability": dict(self.identifiability),
             "units": [row.unit for row in rows.values()],
-            "findings": [_as_record(finding) for finding in self.findings],
+            "findings": [finding.to_record() for finding in self.findings],
         }
         found = xr.Dataset(
             {**data, "covariance": (("parameter", "other"), self._covariance.copy())},
@@ -259,7 +258,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             {name: rows[name] for name in names[:n]},
             dataset["covariance"].values,
             extra={name: rows[name] for name in names[n:]},
-            findings=[_from_record(item) for item in record["findings"]],
+            findings=[*map(Finding.from_record, record["findings"])],
             identifiability=record["identifiability"],
             notes=record["notes"],
             anomalies=record.get("anomalies", ()),
@@ -333,18 +332,3 @@ class ParameterSet(Answering, Mapping[str, float]):
 
     def _title(self) -> str:
         return f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"
-
-
-def _as_record(finding: Finding) -> dict[str, Any]:
-    plain = {name: getattr(finding, name) for name in ("name", "method", "samples_used", "runs", "notes", "plot")}
-    others = {name: list(astuple(other)) for name, other in finding.others.items()}
-    return {**plain, "estimate": list(astuple(finding.estimate)), "others": others}
-
-
-def _from_record(item: Mapping[str, Any]) -> Finding:
-    read = {
-        "estimate": Estimate(*item["estimate"]),  # which reads "inf", a text there
-        "others": {name: Estimate(*row) for name, row in item["others"].items()},
-        **{name: tuple(item[name]) for name in ("runs", "notes")},
-    }
-    return Finding(**{**item, **read})

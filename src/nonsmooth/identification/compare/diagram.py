@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Event
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
+from nonsmooth.attractors.settled import usable
+from nonsmooth.diagrams.sweep_pieces import Slot
 from nonsmooth.identification.compare.draws import Model, intervals
 from nonsmooth.identification.compare.periods import MeasuredFlip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
@@ -16,7 +19,6 @@ from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
 
 FINE = 201
-KEEP = 64
 
 
 def compare_diagram(
@@ -90,10 +92,15 @@ def _marched(
     for value in grid:
         here = {**system.values, name: float(value)}
         systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
-    motions = Motions(systems, model, keep=KEEP, phase=phase)
-    rising = np.argsort(grid, kind="stable").tolist()
-    found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
-    return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])
+    motions, rising = Motions(systems, model, phase), np.argsort(grid, kind="stable").tolist()
+    tables, rest = motions.settler.engine.prepare(motions.points), np.zeros(len(system.states))
+    slots = [Slot(motions.settler, motions.points, None, ()) for _ in words]
+    for word, slot in zip(words, slots, strict=True):
+        slot.march(tables, rising if word == "up" else rising[::-1], rest, True, lambda _: None, Event())
+        slot.kept.section[~usable(slot.status)] = np.nan
+    return np.stack([slot.kept.section[..., model.places] for slot in slots]), np.stack(
+        [slot.period_number for slot in slots]
+    )
 
 
 def _measured(measured: xr.Dataset, name: str, model: Model) -> tuple[FloatArray, FloatArray, IntArray]:

@@ -20,13 +20,11 @@ from nonsmooth.identification.compare.orbits import (
     wasserstein,
 )
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.identification.compare.predict import Motions, Prediction, SteadyState, from_result, predict
+from nonsmooth.identification.compare.predict import SHOWN, Motions, Prediction, SteadyState, from_result, predict
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
 
-KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number
-SHOWN = 16  # forcing periods of the record that are kept for overlays
 MEASURED_STARTS = 4
 
 
@@ -50,7 +48,7 @@ def compare_motion(
     motions = None
     if model.system is not None:
         starts = _starts(sections[0] if phases[0] == 0 else None, folded, model, start)
-        motions = Motions([model.system], model, keep=KEEP)
+        motions = Motions([model.system], model)
         predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])))
     else:
         predicted = from_result(model, phases)
@@ -188,7 +186,7 @@ def _begun_with_the_measurement(
         return predicted
     at = np.empty(len(motions.places))
     at[motions.places] = whole[0, 0]
-    return predicted._replace(orbit=motions.orbit(0, SteadyState(0, at), len(whole)))
+    return predicted._replace(orbit=motions.orbit(0, at, len(whole)))
 
 
 def _shown(folded: FloatArray) -> FloatArray:
@@ -253,7 +251,7 @@ def motion_band(
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
-    motions = Motions(systems, model, keep=64)
+    motions = Motions(systems, model)
     for i in range(draws):
         (one,) = motions.attractors(i, nearest.point)
         numbers[i] = one.period_number
@@ -263,7 +261,7 @@ def motion_band(
             distances[i, j] = energy_distance(sections[j][-POINTS:] / scale, points / scale)
         length = 0 if closed is None else len(closed[0]) // model.grid
         if closed is not None and one.period_number and length % one.period_number == 0:
-            motion = common_length(motions.orbit(i, one, one.period_number), one.period_number, length)
+            motion = common_length(motions.orbit(i, one.point, one.period_number), one.period_number, length)
             motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * model.grid, axis=0)
             orbits.append(motion)
             to_measured[i] = orbit_distance(closed[0], motion, length).distance

@@ -2,89 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray, IntArray
-from nonsmooth.attractors.mapper import Mapper
-from nonsmooth.attractors.settled import Settled, usable
+from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler
+from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.options import longest_period
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.simulate import check_complete
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.orbits import energy_distance, fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.results.labels import by_code
 from nonsmooth.system.system import System
 
+KEEP = 64  # section points by which a predicted motion is judged
 SAME = 1e-6  # orbits whose points are nearer to each other than this part of the motion are one
 
 
 class SteadyState(NamedTuple):
-    """A steady motion: period number (0: none found), and a section point on it at phase 0."""
+    """A steady motion: period number (0: none found), and a section point on it at phase 0 with its mode."""
 
     period_number: int
     point: FloatArray
+    mode: int
 
 
 class Motions:
-    """Steady motions of forced systems that differ in their parameters only: one engine, tables for all, no labels.
+    """Steady motions of forced systems that differ in their parameters only: one attractor mapper, no labels.
 
-    ``cloud``, ``orbit`` and ``carried`` return the states of the model that are compared; ``phase`` is that of the
-    section.
+    ``cloud`` and ``orbit`` return the states of the model that are compared; ``phase`` is that of the section.
     """
 
-    def __init__(self, systems: Sequence[System], model: Model, *, keep: int, phase: float = 0.0) -> None:
+    def __init__(self, systems: Sequence[System], model: Model, phase: float = 0.0) -> None:
         self.system = systems[0].as_solved_by(model.solver)
         if self.system.period() is None:
             raise ValueError(f"{self.system.name!r} has no forcing period; compare takes forced systems")
-        self.places, self.grid = model.places, model.grid
+        self.places, self.grid, keep = model.places, model.grid, max(KEEP, model.max_period + 1)
         self.periods = [float(one.period() or np.nan) for one in systems]
-        self.engine = engine_for(self.system, **model.solver)
         self.points = np.array([one.parameter_vector() for one in systems])
-        keep = max(keep, model.max_period + 1)
         self.settler = Settler(
             self.system,
-            self.engine,
-            self._plan(phase),
+            engine_for(self.system, **model.solver),
+            section_plan(self.system, Stroboscopic(phase))[1],
             model.transient,
             keep,
             longest_period(keep, model.max_period),
             False,
         )
-
-    def _plan(self, phase: float) -> Section:
-        return section_plan(self.system, Stroboscopic(phase))[1]
-
-    def _state(self, start: FloatArray) -> State:
-        return State(start.copy(), self.system.memory_vector())
-
-    def _alone(self, i: int) -> Any:
-        return self.engine.prepare(self.points[i : i + 1])
-
-    def carried(self, order: Iterable[int]) -> tuple[FloatArray, IntArray]:
-        """Section points and period numbers of all systems, the state carried from one to the next, from rest."""
-        rows, periods = np.array([*order], np.int64), np.zeros(len(self.periods), np.int64)
-        sections = self.engine.kept(len(periods), self.settler.keep).section
-        kept, found = self._settled(rows, np.zeros((len(rows), sections.shape[2])), 2)
-        periods[rows], good = found.period_number, usable(found.status)
-        sections[rows[good]] = kept.section[good]
-        return sections[..., self.places], periods
-
-    def _settled(self, rows: IntArray, starts: FloatArray, carried: int) -> tuple[Kept, Settled]:
-        """The kept returns of jobs, and what is known of them."""
-        kept, into = self.engine.kept(len(rows), self.settler.keep), np.arange(len(rows))
-        mapper = Mapper(self.settler, self.engine.prepare(self.points), rows, starts, kept=kept, into=into)
-        mapper.settle(self.settler.rules(), carried, False)(len(rows))
-        return kept, mapper.settled()
 
     def attractors(self, i: int, starts: Any) -> list[SteadyState]:
         """The different motions of system i that the starts settle on, in the order of the starts.
@@ -93,16 +65,18 @@ class Motions:
         """
         found: list[SteadyState] = []
         orbits: list[FloatArray] = []
-        begin = np.atleast_2d(np.asarray(starts, float))
-        kept, runs = self._settled(np.full(len(begin), i), begin, 0)
-        good = usable(runs.status) & np.isfinite(kept.section).all(axis=(1, 2))
-        for points, number in zip(kept.section[good], runs.period_number[good], strict=True):
-            size = np.maximum(np.ptp(points, axis=0), 1e-3 * self.system.scale_vector())
-            same = [orbit for one, orbit in zip(found, orbits, strict=True) if one.period_number == number]
-            away = (np.abs((orbit - points[-1]) / size).max(axis=1).min() for orbit in same)
-            if not any(number == 0 or far < SAME for far in away):
-                found.append(SteadyState(int(number), points[-1].copy()))
-                orbits.append(points[-max(int(number), 1) :])
+        point, begin = self.points[i : i + 1], np.atleast_2d(np.asarray(starts, float))
+        runs = self.settler.run(point, np.zeros(len(begin)), begin)
+        size = np.maximum(runs.maximum - runs.minimum, 1e-3 * self.system.scale_vector())
+        lasts = runs.last[:, : begin.shape[1]]
+        for j in np.flatnonzero(usable(runs.status) & np.isfinite(lasts).all(axis=1)):
+            one = SteadyState(int(runs.period_number[j]), lasts[j], int(runs.mode[j]))
+            alike = [orbit for other, orbit in zip(found, orbits, strict=True) if other[0] == one[0]]
+            away = (np.abs((orbit - one.point) / size[j]).max(axis=1).min() for orbit in alike)
+            if not any(one.period_number == 0 or far < SAME for far in away):
+                found.append(one)
+                returns = max(one.period_number, 1)
+                orbits.append(self.settler.trace(point, runs.last[j], one.mode, 0, returns).points)
         if not found:
             words = "; ".join(by_code(code).sentence for code in np.unique(runs.status).tolist())
             raise ValueError(f"no start of {self.system.name!r} leads to a motion that can be compared: {words}")
@@ -110,25 +84,20 @@ class Motions:
 
     def cloud(self, i: int, attractor: SteadyState, phase: float, n: int) -> FloatArray:
         """Successive points of the section at ``phase``: (n, states); those of a periodic motion come round again."""
-        count = attractor.period_number or n
-        out = self.engine.kept(1, count)
-        plan = self._plan(phase)._replace(extremes=False)
-        start = attractor.point[None, :]
-        self.engine.chain(self._alone(i), 0, 1, self._state(start[0]), start, plan, 0, count, out)
-        if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
-            raise solve_error(int(out.status[0]))
-        points = out.section[0][:, self.places]
+        settler = replace(self.settler, plan=section_plan(self.system, Stroboscopic(phase))[1])
+        place, count = np.r_[attractor.point, self.system.memory_vector(), 0.0], attractor.period_number or n
+        points = settler.trace(self.points[i : i + 1], place, attractor.mode, 0, count).points[:, self.places]
+        if not len(points):
+            raise SolveError(f"a motion of {self.system.name!r} cannot be followed from {attractor.point.tolist()}")
         return np.resize(points, (n, points.shape[1])) if count < n else points
 
-    def orbit(self, i: int, attractor: SteadyState, periods: int) -> FloatArray:
+    def orbit(self, i: int, start: FloatArray, periods: int) -> FloatArray:
         """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
         grid, end = self.grid, periods * self.periods[i]
-        instants = np.linspace(0.0, end, periods * grid + 1)
-        state = self._state(attractor.point)
-        log = self.engine.record(self._alone(i), state, end, instants)
+        instants, state = np.linspace(0.0, end, periods * grid + 1), State(start.copy(), self.system.memory_vector())
+        log = self.settler.engine.record(self.settler.engine.prepare(self.points[i : i + 1]), state, end, instants)
         check_complete(log, self.system, state, self.periods[i])
-        u = log.sample_u[:, self.places]
-        return fold(instants / self.periods[i], u, grid)[:periods].reshape(periods * grid, -1)
+        return fold(instants / self.periods[i], log.sample_u[:, self.places], grid).reshape(periods * grid, -1)
 
 
 EXACT = 1e-6  # noise of a computed section point, in parts of the motion's size
@@ -177,7 +146,7 @@ def predict(
             best = (away, one, sections)
     assert best is not None  # `attractors` raises where there is none
     _, one, sections = best
-    motion = motions.orbit(0, one, one.period_number or SHOWN)
+    motion = motions.orbit(0, one.point, one.period_number or SHOWN)
     numbers = np.array([item.period_number for item in found], np.int64)
     return Prediction(one.period_number, sections, motion, numbers, one)
 

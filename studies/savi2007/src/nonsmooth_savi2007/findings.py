@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
 
 import xarray as xr
 
 from nonsmooth import ParameterSet
-from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification import Finding
 from nonsmooth_savi2007.laboratory import as_result
 
 
@@ -24,13 +23,10 @@ def the_finding(identified: ParameterSet, name: str) -> Finding:
 def kept(finding: Finding) -> xr.Dataset:
     """The finding's data for its picture, with the finding itself in the attribute ``finding``."""
     data = xr.Dataset(attrs={"synthetic": "yes"}) if finding.data is None else finding.data.copy()
-    record = asdict(replace(finding, data=None, covariance=None))
     result = as_result(data, finding.name, "identify", synthetic=data.attrs.get("synthetic") == "yes")
-    return result.assign_attrs(finding=json.dumps(record, ensure_ascii=False, default=float))
+    return result.assign_attrs(finding=json.dumps(finding.to_record(), ensure_ascii=False, default=float))
 
 
 def found_in(data: xr.Dataset) -> Finding:
     """Read back what :func:`kept` put into the dataset."""
-    record = json.loads(data.attrs["finding"])
-    others = {name: Estimate(**one) for name, one in record["others"].items()}
-    return Finding(**record | {"estimate": Estimate(**record["estimate"]), "others": others})
+    return Finding.from_record(json.loads(data.attrs["finding"]))

@@ -89,7 +89,7 @@ def test_an_adjustment_that_does_not_converge_is_refused():
         one("kappa", 10.0, 1e-5),
         one("support_slope", 1200.0, 1e-3),
     ]
-    with pytest.raises(SolveError, match=r"not converged after 50 rounds: 'gain' still changes .* look at the mass"):
+    with pytest.raises(SolveError, match=r"not converged after 50 rounds: '[a-z_]+' still changes .* look at the mass"):
         adjust(given, gain_limit=0.01)
 
 

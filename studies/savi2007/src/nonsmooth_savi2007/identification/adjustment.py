@@ -17,7 +17,7 @@ Phys. Rev. 40 (1932) 207.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,6 +27,7 @@ from scipy.linalg import block_diag
 from nonsmooth import SolveError
 from nonsmooth.identification import Estimate, uniform
 from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth_savi2007.identification.cross_checks import birge_ratio, inverse
 
 _ROUNDS = 50
 _CONVERGED = 1e-6  # of a standard uncertainty
@@ -43,7 +44,7 @@ UNKNOWNS: Mapping[str, str] = {
     "gain": "",
 }
 
-#: What is observed, as a function of the unknowns.
+#: What is observed, as a function of the unknowns: products of their powers.
 LAWS: Mapping[str, Callable[[Any], Any]] = {
     "mass": lambda u: u["m"],
     "test_mass": lambda u: u["test_mass"],
@@ -58,22 +59,6 @@ LAWS: Mapping[str, Callable[[Any], Any]] = {
     "gamma": lambda u: u["c_s"] / u["m"],
     "gain": lambda u: u["gain"],
 }
-
-#: First values of the unknowns, each by the first row of which all was seen.
-_FIRST: Sequence[tuple[str, tuple[str, ...], Callable[..., float]]] = (
-    ("m", ("mass",), lambda m: m),
-    ("k", ("mass", "omega_0"), lambda m, omega: m * omega**2 / 2),
-    ("k", ("spring_slope",), lambda slope: slope / 2),
-    ("c", ("mass", "b"), lambda m, b: m * b),
-    ("friction", ("mass", "f"), lambda m, f: m * f),
-    ("test_mass", ("test_mass",), lambda m: m),
-    ("k_s", ("test_mass", "omega_s"), lambda m, omega: m * omega**2),
-    ("k_s", ("support_slope",), lambda slope: slope),
-    ("k_s", ("mass", "kappa"), lambda m, kappa: m * kappa),
-    ("c_s", ("test_mass", "b_s"), lambda m, b: m * b),
-    ("c_s", ("mass", "gamma"), lambda m, gamma: m * gamma),
-    ("gain", ("gain",), lambda gain: gain),
-)
 
 
 class Observation(NamedTuple):
@@ -93,15 +78,16 @@ class Observation(NamedTuple):
 class Adjusted:
     """The unknowns that the observations determine, their covariance, and how well all fits together.
 
-    ``birge`` is the root of chi^2 per degree of ``freedom`` (NaN where nothing is left over); ``pulls`` are the
-    residuals of the observations over their standard uncertainties. ``influence`` (p, n) is how much each unknown moves
-    with each observed value, ``labels`` their names in order.
+    ``birge`` is the root of chi^2 per degree of ``freedom`` (NaN where nothing is left over), and ``agree`` whether
+    chance explains it; ``pulls`` are the residuals of the observations over their standard uncertainties.
+    ``influence`` (p, n) is how much each unknown moves with each observed value, ``labels`` their names in order.
     """
 
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
     birge: float
+    agree: bool
     freedom: int
     pulls: Mapping[str, float]
     influence: FloatArray
@@ -151,26 +137,26 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
         labels.append("gain")
     y = np.concatenate([o.values for o in observations])
     covariance = block_diag(*(o.covariance for o in observations))
-    seen, first = dict(zip(labels, y.tolist(), strict=True)), dict[str, float]()
-    for name, needed, law in _FIRST:
-        if name not in first and seen.keys() >= set(needed):
-            first[name] = law(*(seen[label] for label in needed))
-    names = tuple(name for name in UNKNOWNS if name in first)
-    u = np.array([first[name] for name in names])
-    scale, size = np.where(u != 0, u, 1.0), np.sqrt(np.diag(covariance))
-    weight = np.linalg.inv(covariance / np.outer(size, size))
+    weight, names = inverse(covariance), tuple(UNKNOWNS)
 
     def expected(u: Any) -> Any:
         at = dict(zip(names, u, strict=True))
         return np.array([LAWS[label](at) for label in labels])
 
+    def slopes(u: FloatArray) -> FloatArray:  # by imaginary parts
+        return np.transpose([expected(u + 1e-30j * one).imag for one in np.eye(len(u))]) / 1e-30
+
+    ones = np.ones(len(names))
+    powers, factors = slopes(ones) / expected(ones)[:, None], expected(ones)
+    names = tuple(name for name, there in zip(names, powers.any(axis=0), strict=True) if there)
+    logs = np.log(np.maximum(np.abs(y), 1e-9) / factors)
+    u = np.exp(np.linalg.lstsq(powers[:, powers.any(axis=0)], logs, rcond=None)[0])
     for _ in range(_ROUNDS):
-        # derivatives by imaginary parts
-        jacobian = np.transpose([expected(row).imag for row in u + 1e-30j * np.diag(scale)]) / (1e-30 * size[:, None])
-        normal = jacobian.T @ weight @ jacobian
-        change = np.linalg.solve(normal, jacobian.T @ weight @ ((y - expected(u)) / size))
-        u = u + change * scale
-        off = np.abs(change) / np.sqrt(np.diag(np.linalg.inv(normal)))
+        jacobian = slopes(u)
+        found = inverse(jacobian.T @ weight @ jacobian)
+        influence = found @ jacobian.T @ weight
+        change = influence @ (y - expected(u))
+        u, off = u + change, np.abs(change) / np.sqrt(np.diag(found))
         if np.max(off) < _CONVERGED:
             break
     else:
@@ -180,14 +166,11 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
             f"({', '.join(label for label in labels if label != 'gain')}) contradict each other by far: look at the "
             "mass, the wheel and the units, and leave out what is in doubt"
         )
-    left = (y - expected(u)) / size
-    chi2 = float(left @ weight @ left)
-    freedom = len(y) - len(names)
+    left, freedom = y - expected(u), len(y) - len(names)
     pulls = dict[str, float]()
-    for i, label in enumerate(labels):
+    for i, (label, pull) in enumerate(zip(labels, left / np.sqrt(np.diag(covariance)), strict=True)):
         if label != "gain":
-            pulls[label if label not in pulls else f"{label} ({i})"] = left[i]
-    birge = float(np.sqrt(chi2 / freedom)) if freedom > 0 else float("nan")
-    influence = np.linalg.solve(normal, jacobian.T @ weight) * scale[:, None] / size
-    found = np.linalg.inv(normal) * np.outer(scale, scale)
-    return Adjusted(names, u, found, birge, freedom, pulls, influence, tuple(labels))
+            pulls[label if label not in pulls else f"{label} ({i})"] = pull
+    return Adjusted(
+        names, u, found, *birge_ratio(left @ weight @ left, freedom), freedom, pulls, influence, tuple(labels)
+    )

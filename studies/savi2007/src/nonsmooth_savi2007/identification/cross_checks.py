@@ -73,6 +73,13 @@ def birge_ratio(chi2: float, freedom: int) -> tuple[float, bool]:
     return np.sqrt(chi2 / freedom), bool(distribution.sf(chi2, freedom) >= CHANCE)
 
 
+def inverse(matrix: Any) -> FloatArray:
+    """Inverse of covariances (..., p, p), of quantities whose uncertainties differ by orders of magnitude."""
+    size = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
+    unit = size[..., None] * size[..., None, :]
+    return np.linalg.inv(matrix / unit) / unit
+
+
 def consistent(values: Any, covariances: Any) -> Consistent:
     """Largest set of measurements that agree, found by leaving out one after another.
 
@@ -90,14 +97,12 @@ def consistent(values: Any, covariances: Any) -> Consistent:
     """
     given = np.asarray(values, float)
     known = np.asarray(covariances, float)
-    size = np.sqrt(np.mean(np.diagonal(known, axis1=1, axis2=2), axis=0))
-    scaled, weights = given / size, np.linalg.inv(known / np.outer(size, size))
-    n, p = given.shape
+    weights, (n, p) = inverse(known), given.shape
 
     def chi2(rows: list[int]) -> tuple[float, FloatArray, FloatArray]:
-        covariance = np.linalg.inv(weights[rows].sum(axis=0))
-        mean = covariance @ np.einsum("ijk,ik->j", weights[rows], scaled[rows])
-        off = scaled[rows] - mean
+        covariance = inverse(weights[rows].sum(axis=0))
+        mean = covariance @ np.einsum("ijk,ik->j", weights[rows], given[rows])
+        off = given[rows] - mean
         return np.einsum("ij,ijk,ik->", off, weights[rows], off), mean, covariance
 
     rows = list(range(n))
@@ -109,16 +114,15 @@ def consistent(values: Any, covariances: Any) -> Consistent:
         if 2 * (len(rows) - 1) <= n:  # one fewer would be no majority
             rows = list(range(n))
             total, mean, covariance = chi2(rows)
-            birge = birge_ratio(total, (n - 1) * p)[0]
+            birge, _ = birge_ratio(total, (n - 1) * p)
             break
         rows = min(([i for i in rows if i != out] for out in rows), key=lambda kept: chi2(kept)[0])
     used = np.zeros(n, bool)
     used[rows] = True
-    share = 1.0 / np.trace(np.linalg.inv(weights[rows]), axis1=1, axis2=2)
-    off = scaled[rows] - mean
+    variances = np.diagonal(known[rows], axis1=1, axis2=2)
+    share, off = 1.0 / np.sum(variances / variances.mean(axis=0), axis=1), given[rows] - mean
     scatter = np.einsum("i,ij,ik->jk", share / share.sum(), off, off) * len(rows) / max(len(rows) - 1, 1)
-    unit = np.outer(size, size)
-    return Consistent(used, birge, agree, mean * size, covariance * unit, scatter * unit)
+    return Consistent(used, birge, agree, mean, covariance, scatter)
 
 
 class Check(NamedTuple):

@@ -36,6 +36,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
 from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth_savi2007.identification.cross_checks import inverse
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data
@@ -272,28 +273,21 @@ def _values(found: ParameterSet) -> FloatArray:
 
 def _joined(rows: Sequence[tuple[ParameterSet, ParameterSet, FloatArray]]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Values, covariance and shift by turns of all runs together: weights add, that of the decays counts once."""
-    s, n = len(SHARED), len(SHARED) + len(OWN) * len(rows)
-    scale, total = np.ones(n), np.zeros((n, n))
-    pull, shift = np.zeros(n), np.zeros(n)
+    names, s, n = [*SHARED, *OWN], len(SHARED), len(SHARED) + len(OWN) * len(rows)
+    total, pull, shift = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     for i, (found, known, moved) in enumerate(rows):
         here = np.r_[range(s), range(s + len(OWN) * i, s + len(OWN) * (i + 1))]
-        names = [*SHARED, *OWN]
-        own = found.full_covariance.sel(parameter=names, other=names).values
-        if not i:
-            scale[:s] = np.sqrt(np.diag(own))[:s]
-        scale[here[s:]] = np.sqrt(np.diag(own))[s:]
-        size = np.outer(scale[here], scale[here])
-        information = np.linalg.inv(own / size)
-        value = _values(found) / scale[here]
+        information = inverse(found.full_covariance.sel(parameter=names, other=names).values)
+        value = _values(found)
         if i:
-            decays = np.linalg.inv(known.full_covariance.values[:3, :3] / size[:3, :3])
+            decays = inverse(known.full_covariance.values[:3, :3])
             information[:3, :3] -= decays
-            pull[:3] += decays @ (value[:3] - [known[name] / scale[k] for k, name in enumerate(SHARED[:3])])
+            pull[:3] += decays @ (value[:3] - [known[name] for name in SHARED[:3]])
         total[np.ix_(here, here)] += information
         pull[here] += information @ value
-        shift[here] += information @ (moved / scale[here])
-    covariance = np.linalg.inv(total)
-    return covariance @ pull * scale, covariance * np.outer(scale, scale), covariance @ shift * scale
+        shift[here] += information @ moved
+    covariance = inverse(total)
+    return covariance @ pull, covariance, covariance @ shift
 
 
 def contact_finding(found: ContactFit, mass: Quantity | Estimate) -> Finding:

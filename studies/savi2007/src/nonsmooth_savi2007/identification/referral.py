@@ -23,7 +23,7 @@ from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted
-from nonsmooth_savi2007.identification.cross_checks import consistent
+from nonsmooth_savi2007.identification.cross_checks import consistent, inverse
 from nonsmooth_savi2007.identification.evidence import Evidence
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.multiple_shooting import ContactFit
@@ -134,11 +134,10 @@ def mean_shift(
         known = np.array([max(zero_error, 1e-9), alpha_error, 0.03 / 4]) ** -2.0
         spread = 1e-5
         for _ in range(3):  # the scatter of the means from what the fit leaves of them
-            normal = matrix.T @ matrix / spread**2 + np.diag(known)
-            found = np.linalg.solve(normal, matrix.T @ y / spread**2 + known * [zero, alpha, 0.0])
-            covariance = np.asarray(np.linalg.inv(normal), float)
+            covariance = inverse(matrix.T @ matrix / spread**2 + np.diag(known))
+            found = covariance @ (matrix.T @ y / spread**2 + known * [zero, alpha, 0.0])
             left = y - matrix @ found
-            spread = max(np.sqrt(left @ left / max(len(y) - 2, 1)), 1e-6)
+            spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
         rest, curved, straight = found.tolist()
         return MeanShift(rest, curved, straight, covariance, covariance[:, 0] * known[0], len(y), length)
 

@@ -11,7 +11,6 @@ from nonsmooth import ParameterSet, System
 from nonsmooth.errors import unknown
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth_savi2007.identification.adjustment import Adjusted
-from nonsmooth_savi2007.identification.cross_checks import birge_ratio
 from nonsmooth_savi2007.identification.evidence import Evidence
 from nonsmooth_savi2007.identification.multiple_shooting import ContactFit
 from nonsmooth_savi2007.identification.referral import Referred
@@ -31,7 +30,7 @@ _NEEDED = ("springs", "support", "impulse", "drop", "response", "contact")
 def agreement(adjusted: Adjusted, evidence: Evidence) -> list[str]:
     """That the procedures agree, and which were not recorded."""
     notes = []
-    if np.isfinite(adjusted.birge) and not disagreement(adjusted):
+    if adjusted.freedom > 0 and adjusted.agree:
         notes.append(
             f"the procedures agree: Birge ratio {adjusted.birge:.2f}, {adjusted.freedom} degree"
             f"{'s' if adjusted.freedom > 1 else ''} of freedom"
@@ -43,8 +42,7 @@ def agreement(adjusted: Adjusted, evidence: Evidence) -> list[str]:
 
 def disagreement(adjusted: Adjusted) -> str:
     """A sentence where the procedures disagree by more than chance, else an empty one."""
-    freedom = adjusted.freedom
-    if freedom < 1 or not np.isfinite(adjusted.birge) or birge_ratio(freedom * adjusted.birge**2, freedom)[1]:
+    if adjusted.agree:
         return ""
     name, pull = max(adjusted.pulls.items(), key=lambda row: abs(row[1]))
     return (
