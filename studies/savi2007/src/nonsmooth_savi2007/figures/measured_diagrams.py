@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from nonsmooth import plot, sweep
+from nonsmooth import plot, sweep, system_of
 from nonsmooth.plot import COLORS, comparison_diagram, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS
 from nonsmooth_savi2007.figures.diagrams import mark
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
-from nonsmooth_savi2007.figures.motions import diagram_of, model_at, motions, runs_of
+from nonsmooth_savi2007.figures.motions import diagram_of, motions, runs_of
 from nonsmooth_savi2007.flows import EXACT, Settings, starts
 
 RISES = (450.0, 900.0, 1800.0)  # s, from 0.2 to 0.5 N; the one in the middle is drawn
@@ -95,10 +95,9 @@ def _without_flips(result: xr.Dataset) -> xr.Dataset:
 def _measure_13(settings: Settings) -> Datasets:
     """The diagram, and the model's motions from several starts, with the parameters identified."""
     data = _compared(settings, "fig13", 14, 71 if settings.quick else 351)
-    _, set_ = diagram_of(motions(settings.bench, 14), "g")
     points, count, transient = (21, 4, 80) if settings.quick else (141, 12, 600)
     data["starts"] = sweep(
-        model_at(settings.bench, set_),
+        system_of(data["compared"]),
         "g",
         np.linspace(*BEGINNINGS["fig13"].range, points),
         direction=None,

@@ -10,9 +10,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from nonsmooth import System, plot
+from nonsmooth import plot
 from nonsmooth.identification.compare import measured_sections
-from nonsmooth.models import discontinuous_support
 from nonsmooth.plot import comparison_phase_portrait, name_plane, prefixed, shade_zone, shared_legend
 from nonsmooth_savi2007.figures.diagrams import PATIENCE
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, two_rows
@@ -68,16 +67,6 @@ def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, An
 def _value(settings: Mapping[str, Any], name: str) -> float:
     """The value of a setting, which may stand with its uncertainty."""
     return float(np.atleast_1d(settings[name])[0])
-
-
-def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
-    """The model with the parameters identified, at the settings of a measurement."""
-    system = discontinuous_support().with_parameters(dict(bench.identified))
-    values = {
-        name: float(rule(system.values) if callable(rule) else np.atleast_1d(rule)[0])
-        for name, rule in settings.items()
-    }
-    return system.with_parameters(values)
 
 
 def runs_of(found: Motions, parameter: str) -> xr.Dataset:

@@ -22,10 +22,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
 from nonsmooth_savi2007.arrays import FloatArray
@@ -131,13 +131,8 @@ def swing(run: Run, slowest: float = SLOWEST) -> tuple[int, int]:
     if len(moving) == 0 or np.max(np.abs(away)) < 20 * run.resolution:
         raise ValueError(f"the car moves by {np.max(np.abs(away)) / run.resolution:.0f} counts only: tap it harder")
     # before the tap it rests, or is held: the first turning point comes after it has begun to move
-    begin = first = int(moving[0])
-    reach, way = 0.5 * np.max(np.abs(away[first:])), 0.0
-    for i in range(first, len(steps)):
-        if way * steps[i] < 0 and abs(away[i]) > reach and way * away[i] > 0:
-            begin = i
-            break
-        way = float(np.sign(steps[i])) or way
+    _, tops = find_peaks(np.abs(away), height=0.5 * np.max(np.abs(away)), plateau_size=1)
+    begin = int(np.append(tops["right_edges"], moving)[0])
     crossings = begin + 1 + np.flatnonzero(np.sign(away[begin + 1 :]) != np.sign(away[begin:-1]))
     at = crossings[(crossings >= begin + 2) & (crossings < len(x) - 2)]
     speeds = np.abs(x[at + 2] - x[at - 2]) / (time[at + 2] - time[at - 2])
@@ -205,18 +200,9 @@ def _oscillator(friction: bool) -> System:
 
 
 def _guess(parts: Sequence[Decay]) -> FloatArray:
-    """First values from turning points: half a period between them; each swing is q times the one before."""
-    periods, ratios = [], []
-    for part in parts:
-        away = part.x - (np.mean(part.x[-20:]) if len(part.x) > 40 else 0.0)
-        turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
-        if len(turned) > 1:
-            periods.append(2 * np.mean(np.diff(part.time[turned])))
-            heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
-            ratios += [h / g for g, h in pairwise(heights) if g > 0]
-    period = np.median(periods) if periods else 1.4
-    b = -4 * np.log(min(np.median(ratios), 0.99) if ratios else 0.7) / period  # swing to swing: exp(-b T/4)
-    return np.array([np.sqrt((2 * np.pi / period) ** 2 + b**2 / 4), b, 0.005, 0.0])
+    """First values: half a period between zeros, and a damping as that of the published car."""
+    halves = [np.diff(part.time[np.flatnonzero(np.diff(np.sign(part.x - np.mean(part.x[-20:]))))]) for part in parts]
+    return np.array([np.pi / np.median(np.concatenate(halves)), 1.0, 0.005, 0.0])
 
 
 class _Method(NamedTuple):
