@@ -165,8 +165,8 @@ def amplitude_dependent(
         "amplitude": labelled("amplitude", grid, "amplitude of the mode", "m"),
         "curves": ("curves", list(fit.names)),
     }
-    f_n, f_last = (Estimate(float(f[i]), float(f_error[i]), "Hz") for i in (0, -1))
-    zeta_n, zeta_last = (Estimate(float(zeta[i]), float(zeta_error[i])) for i in (0, -1))
+    f_n, f_last = (Estimate(f[i], f_error[i], "Hz") for i in (0, -1))
+    zeta_n, zeta_last = (Estimate(zeta[i], zeta_error[i]) for i in (0, -1))
     others = {"zeta": zeta_n, "f_n at the largest amplitude": f_last, "zeta at the largest amplitude": zeta_last}
     others |= _others(fit)
     finding = Finding(
@@ -189,16 +189,16 @@ def _others(fit: ResponseFit) -> dict[str, Estimate]:
     error = np.sqrt(np.diag(fit.covariance))
     found: dict[str, Estimate] = {}
     if fit.forced and fit.mass is None:
-        found["modal mass"] = Estimate(fit.mode.mass, fit.mode.mass * float(error[fit.at["load"]][0]), "kg")
+        found["modal mass"] = Estimate(fit.mode.mass, fit.mode.mass * error[fit.at["load"]][0], "kg")
     if fit.residual:
         R = fit.mode.residual
         for name, size, value in zip(("real", "imag"), error[fit.at["residual"]], (R.real, R.imag), strict=True):
-            found[f"residual, {name}"] = Estimate(1e6 * value, 1e6 * float(size) * fit.unit, "µm/N")
+            found[f"residual, {name}"] = Estimate(1e6 * value, 1e6 * size * fit.unit, "µm/N")
     if fit.shifts:
         n = np.sqrt(2.0 * len(fit.names))
-        f = 0.5 * float(np.sqrt(np.mean(fit.mode.squares)) / (2 * np.pi)) * float(fit.spread[0])
+        f = 0.5 * np.sqrt(np.mean(fit.mode.squares)) / (2 * np.pi) * fit.spread[0]
         found["f_n from curve to curve"] = Estimate(f, f / n, "Hz")
-        found["zeta from curve to curve, relative"] = Estimate(float(fit.spread[1]), float(fit.spread[1]) / n)
+        found["zeta from curve to curve, relative"] = Estimate(fit.spread[1], fit.spread[1] / n)
     return found
 
 

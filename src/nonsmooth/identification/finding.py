@@ -60,7 +60,7 @@ def reach_of(normal: float, half_width: float, level: float) -> float:
     def excess(z: float) -> float:
         u = np.array([z + w, z - w])
         above, below = u * ndtr(u) + np.exp(-u * u / 2) / np.sqrt(2 * np.pi)
-        return float((above - below) / w - 1.0 - level)
+        return (above - below) / w - 1.0 - level
 
     return normal * float(brentq(excess, 0.0, w + 10.0, xtol=1e-10))
 
@@ -177,7 +177,7 @@ class Estimate:
         value = self.value * size
         return Estimate(
             value,
-            float(np.hypot(self.uncertainty * size, self.value * error)),
+            np.hypot(self.uncertainty * size, self.value * error),
             self.unit if unit is None else unit,
             self.half_width * abs(size),
             self.logarithmic,

@@ -138,12 +138,12 @@ class NonlinearMode:
 
     def _top(self, force: float, least: float) -> float:
         """The largest amplitude that the force reaches, at phase resonance: F = m a D(a) sqrt(omega_n^2 - D^2/4)."""
-        a = np.linspace(least, float(self.knots[-1]), 2001)
+        a = np.linspace(least, self.knots[-1], 2001)
         D = self.damping(a)
         room = force - self.mass * a * D * np.sqrt(np.maximum(self.square(a) - D**2 / 4, 0.0))
         if room[0] < 0:
             return least
-        return first_zero(a, room) if (room < 0).any() else float(a[-1])
+        return first_zero(a, room) if (room < 0).any() else a[-1]
 
 
 def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) -> FloatArray:
@@ -268,7 +268,7 @@ class ResponseFit:
                 # by how much of what the points of a curve say of its shift: towards 0 the way is long
                 told = np.mean(np.maximum(np.diag(normal)[shift] - prior[shift], 1e-300).reshape(2, n), axis=1)
                 change = np.abs(spread - before[1:])
-                moved = float(np.max(np.minimum(change / spread, change * np.sqrt(told))))
+                moved = np.max(np.minimum(change / spread, change * np.sqrt(told)))
             if k > 2 and moved < 1e-2 and abs(sigma / before[0] - 1) < 1e-2:
                 break
         else:
@@ -277,7 +277,7 @@ class ResponseFit:
                 f"{(sigma, *spread)} in the last two; take fewer knots, or leave out a curve that stands apart"
             )
         self.covariance = inverse
-        self.sigma = float(np.sqrt(left @ left / freedom))
+        self.sigma = np.sqrt(left @ left / freedom)
         self.spread = spread if self.shifts else np.array([np.nan, np.nan])
         self.mode, _, by_curve = self._unpack(p)
         self.modes = [
@@ -293,10 +293,10 @@ class ResponseFit:
         tops = [int(np.argmax(np.where(self.curve == c, gain, 0.0))) for c in range(len(self.names))]
         lowest, *_ = tops = sorted(tops, key=lambda i: size[i])
         w, h = (v[self.curve == self.curve[lowest]] for v in (self.omega, gain))
-        step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
+        step = np.median(np.abs(np.diff(w))) if len(w) > 1 else 0.01 * w[0]
         D = max(np.ptp(w[h > h.max() / np.sqrt(2.0)]), step)
         at_top = D * self.omega[lowest]  # displacement times this is force by mass there
-        self.unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
+        self.unit = 1.0 / np.median(1.0 / gain) if self.residual else 1.0
         p = np.zeros(count)
         p[self.at["square"]] = 2 * np.log(np.interp(self.knots, size[tops], self.omega[tops]))
         p[self.at["damping"]] = np.log(D)
@@ -335,7 +335,7 @@ def _knots(knots: int | ArrayLike, size: FloatArray) -> FloatArray:
     if isinstance(knots, int):
         if knots < 1:
             raise ValueError(f"knots must be at least 1, got {knots}")
-        return np.linspace(size.min(), size.max(), knots) if knots > 1 else np.array([float(np.median(size))])
+        return np.linspace(size.min(), size.max(), knots) if knots > 1 else np.array([np.median(size)])
     given = np.asarray(knots, float)
     if given.ndim != 1 or len(given) < 1 or not (given > 0).all() or not (np.diff(given) > 0).all():
         raise ValueError(f"knots must be positive, increasing amplitudes (m), got {given!r}")

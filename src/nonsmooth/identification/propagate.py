@@ -232,7 +232,7 @@ def to_first_order(
             ahead, behind = (matched(branch, one, "special") for one in ends)
             slope[lost, i] = ((ahead - behind) / (2 * h))[lost]
     for i, name in zip(*np.nonzero(np.isnan(slope)), strict=True):
-        kind, at = table["kind"].values[i], float(table[own].values[i])
+        kind, at = table["kind"].values[i], table[own].values[i]
         warnings.warn(
             f"special_first_order is NaN for the {kind} at {own} = {at:.6g}: it has no curve of its own, and with "
             f"{sources[name][0]} changed by {DIFFERENCE:g} standard uncertainties the branch shows no {kind} beside it",
@@ -265,4 +265,4 @@ def _slope(row: xr.Dataset, name: str) -> float:
     if first is None or first.tangent[-2] == 0.0:
         return np.nan
     other, along = first.tangent[-2:] * first.curve.scale[-2:]
-    return float(along / other)
+    return along / other

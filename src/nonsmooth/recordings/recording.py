@@ -48,16 +48,16 @@ def examine(time: FloatArray) -> Sampling:
     if len(steps) == 0 or time[-1] == time[0]:
         return Sampling(float("nan"), True, repeated, (), None)
     change = _change_of_rate(steps)
-    typical = float(np.median(steps))
+    typical = np.median(steps)
     if typical == 0 or repeated > len(steps) // 10:
         # Rounded times: only their mean says anything.
-        return Sampling(float(len(steps) / (time[-1] - time[0])), False, repeated, (), change)
+        return Sampling(len(steps) / (time[-1] - time[0]), False, repeated, (), change)
     # The lengths of a rate's own steps, not its gaps; a step within rounding of typical counts once.
     counts = np.maximum(np.rint(np.minimum(steps / typical, 1e15)), 1)
     wide = np.flatnonzero(steps > _GAP * typical)
     if change is None and len(wide) <= max(3, len(steps) // 20):
         gaps = tuple((int(i), int(counts[i]) - 1) for i in wide if counts[i] > 1)
-        rate = float(counts.sum() / (time[-1] - time[0]))
+        rate = counts.sum() / (time[-1] - time[0])
     else:
         gaps, rate = (), 1.0 / typical
     expected = time[0] + np.concatenate([[0.0], np.cumsum(counts if gaps else np.ones(len(steps)))]) / rate
@@ -93,13 +93,13 @@ def _change_of_rate(steps: FloatArray) -> tuple[int, float, float] | None:
     middle = np.median(blocks, axis=1, keepdims=True)
     means = np.where(middle > 0, np.minimum(blocks, 2 * middle), blocks).mean(axis=1)
     positive = np.maximum(means, np.finfo(float).tiny)
-    reference = float(np.median(positive[: max(1, min(4, count // 2))]))
+    reference = np.median(positive[: max(1, min(4, count // 2))])
     away = np.abs(positive / reference - 1) > threshold
     # One block is jitter, a gap, or the change itself inside a block: two in a row, or all of the rest, are a change.
     for i in np.flatnonzero(away):
         rest = away[i:]
         if len(rest) >= 2 and bool(rest[:2].all()):
-            after = float(np.median(positive[i + 1 : i + 5]))
+            after = np.median(positive[i + 1 : i + 5])
             if abs(after / reference - 1) > threshold:
                 # The block only says about where; the first of its steps that is nearer to the new one says it.
                 near = steps[int(i) * block : (int(i) + 2) * block]

@@ -76,7 +76,7 @@ def compare_diagram(
     else:
         seen = delayed_flips(at, points, model.noise, numbers)
         variables["rise_per_return"] = labelled(
-            (), float((at[-1] - at[0]) / (len(at) - 1)), f"rise of {name} per return", unit
+            (), (at[-1] - at[0]) / (len(at) - 1), f"rise of {name} per return", unit
         )
     return variables | _flips(seen, flips(grid, periods[0]), drawn_flips, unit, model)
 

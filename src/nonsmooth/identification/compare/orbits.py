@@ -128,13 +128,13 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     n, states = x.shape
     fx, fy = np.fft.fft(x / size, axis=0) / n, np.fft.fft(y / size, axis=0) / n
     order = np.fft.fftfreq(n, 1 / n)
-    power = float((np.abs(fx) ** 2 + np.abs(fy) ** 2).sum())
+    power = (np.abs(fx) ** 2 + np.abs(fy) ** 2).sum()
     cross = (np.conj(fx) * fy).sum(axis=1)
 
     def distance(lead: float) -> float:
         """``y`` led by this part of the whole length, against ``x``."""
-        likeness = float((cross * np.exp(-2j * np.pi * order * lead)).real.sum())
-        return float(np.sqrt(max(power - 2 * likeness, 0.0) / states))
+        likeness = (cross * np.exp(-2j * np.pi * order * lead)).real.sum()
+        return np.sqrt(max(power - 2 * likeness, 0.0) / states)
 
     # At the n leads i / n the likeness is one Fourier sum.
     grid = np.sqrt(np.maximum(power - 2 * np.fft.fft(cross).real, 0.0) / states)
@@ -142,9 +142,9 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     best = int(np.argmin(whole))
     near = np.argmin(grid) / n
     found = minimize_scalar(distance, bounds=(near - 1 / n, near + 1 / n), method="bounded", options={"xatol": 1e-10})
-    lead = float(found.x) if found.fun <= grid.min() else near
+    lead = found.x if found.fun <= grid.min() else near
     shift = (lead * periods + 0.5) % 1.0 - 0.5
-    return OrbitDistance(float(whole[best]), min(float(found.fun), grid.min()), best, shift)
+    return OrbitDistance(whole[best], min(found.fun, grid.min()), best, shift)
 
 
 def common_length(orbit: ArrayLike, periods: int, length: int) -> FloatArray:
@@ -188,7 +188,7 @@ class CloudDistance(NamedTuple):
     @property
     def ratio(self) -> float:
         """``matched`` over the 95th percentile of ``halves``."""
-        return float(self.matched / np.quantile(self.halves, 0.95))
+        return self.matched / np.quantile(self.halves, 0.95)
 
 
 def energy_distance(a: ArrayLike, b: ArrayLike) -> float:
@@ -197,7 +197,7 @@ def energy_distance(a: ArrayLike, b: ArrayLike) -> float:
     In one dimension it equals ``scipy.stats.energy_distance``. The clouds must be in one common unit.
     """
     x, y = _two_clouds(a, b)
-    return float(_root(2 * cdist(x, y).mean() - cdist(x, x).mean() - cdist(y, y).mean()))
+    return _root(2 * cdist(x, y).mean() - cdist(x, x).mean() - cdist(y, y).mean())
 
 
 def wasserstein(a: ArrayLike, b: ArrayLike, seed: int = 0) -> float:
@@ -211,7 +211,7 @@ def wasserstein(a: ArrayLike, b: ArrayLike, seed: int = 0) -> float:
     rng = np.random.default_rng(seed)
     x, y = (cloud if len(cloud) == size else rng.choice(cloud, size, replace=False) for cloud in (x, y))
     cost = cdist(x, y)
-    return float(cost[linear_sum_assignment(cost)].mean())
+    return cost[linear_sum_assignment(cost)].mean()
 
 
 def block_length(points: ArrayLike) -> int:
@@ -255,8 +255,8 @@ def cloud_distance(
     within, beyond = _mean(left, to_left, left), _mean(first, to_first, first)
     halves = _root(2 * _mean(left, to_right, right) - within - _mean(right, to_right, right))
     other_halves = _root(2 * _mean(first, to_second, second) - beyond - _mean(second, to_second, second))
-    matched = float(np.median(_root(2 * _mean(left, xy @ first, first) - within - beyond)))
-    whole = float(_root(2 * xy.mean() - xx.mean() - yy.mean()))
+    matched = np.median(_root(2 * _mean(left, xy @ first, first) - within - beyond))
+    whole = _root(2 * xy.mean() - xx.mean() - yy.mean())
     return CloudDistance(whole, matched, halves, other_halves, length, size)
 
 

@@ -111,7 +111,7 @@ def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
         wrong = below if below.min() <= above.min() else above
         best = np.flatnonzero(wrong == wrong.min())  # a tie is cut in its middle
         edges = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
-        found[f"{p}-{2 * p}"] = float(0.5 * (edges[best[0]] + edges[best[-1]]))
+        found[f"{p}-{2 * p}"] = 0.5 * (edges[best[0]] + edges[best[-1]])
     return found
 
 
@@ -160,7 +160,7 @@ def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, word: str, 
         one = slice(begin + k, end, p)
         rho, size = _splitting(where[one], cloud[one])
         if len(size) >= FEWEST and (best is None or size.max() > best[0]):
-            best = (float(size.max()), rho, size)
+            best = (size.max(), rho, size)
     if best is None:
         return nothing
     largest, rho, size = best
@@ -215,7 +215,7 @@ def _fitted(rho: FloatArray, size: FloatArray, time: float) -> tuple[float, floa
         return None
     _, flip, error = held[0]
     spread = 0.5 * (max(one[1] for one in held) - min(one[1] for one in held))
-    return float(rho[0] + span * flip), float(abs(span) * np.hypot(error, spread))
+    return rho[0] + span * flip, abs(span) * np.hypot(error, spread)
 
 
 def _one_fit(
@@ -245,10 +245,10 @@ def _one_fit(
         covariance = np.linalg.inv(found.jac.T @ found.jac) * variance * ALIKE
     except np.linalg.LinAlgError:
         return None
-    flip, error = float(found.x[0]), float(np.sqrt(covariance[0, 0]))
+    flip, error = found.x[0], np.sqrt(covariance[0, 0])
     if not (0 < flip < 1 and error < 0.5):
         return None
-    return float(found.cost) / variance + len(start), flip, error
+    return found.cost / variance + len(start), flip, error
 
 
 def _guess(place: FloatArray, size: FloatArray) -> tuple[float, float, float] | None:
@@ -266,7 +266,7 @@ def _guess(place: FloatArray, size: FloatArray) -> tuple[float, float, float] | 
     (constant, rate, fall), *_ = np.linalg.lstsq(columns * weight, slope * middle, rcond=None)
     if rate <= 0 or fall <= 0:
         return None
-    return float(constant / rate), float(np.log(rate)), float(0.5 * np.log(rate / fall))
+    return constant / rate, np.log(rate), 0.5 * np.log(rate / fall)
 
 
 def _amplitude(growth: FloatArray, gain: float, first: float) -> FloatArray:

@@ -51,8 +51,8 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
         carried = (2 * near - far for near, far in beside)
         if abs(step[i]) <= least or any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
             continue
-        middle, half = 0.5 * (x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
-        found.append(AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1])))
+        middle, half = 0.5 * (x[i] + x[i + 1]), 0.5 * abs(x[i + 1] - x[i])
+        found.append(AmplitudeJump(middle, half, heights[i], heights[i + 1]))
     return found
 
 
@@ -178,7 +178,7 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
         band, reach = model.band(stack_runs), 2 * np.nan_to_num(runs["error"])
         inside = (runs["amplitude"] + reach >= band["low"]) & (runs["amplitude"] - reach <= band["high"])
         variables["inside_band"] = labelled(
-            (), float(inside.mean()), "share of the runs within two standard errors of the band"
+            (), inside.mean(), "share of the runs within two standard errors of the band"
         )
         variables |= drawn
     return variables | match_jumps(seen, expected, drawn_jumps, unit, model.level)
@@ -225,7 +225,7 @@ def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jum
     for d, word in enumerate(directions):
         x, heights = (values, curves[:, d]) if word == "up" else (values[::-1], curves[::-1, d])
         steps = [(x[[i, j]], heights[[i, j]].tolist()) for i, j in jumps_in(x, heights)]
-        found[word] = [AmplitudeJump(float(at.mean()), 0.5 * np.ptp(at), *both) for at, both in steps]
+        found[word] = [AmplitudeJump(at.mean(), 0.5 * np.ptp(at), *both) for at, both in steps]
     return found
 
 

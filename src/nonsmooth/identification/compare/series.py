@@ -68,10 +68,10 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         # Pairs of periods, so that a motion of period two shows its whole range.
         pairs = whole[: len(whole) // 2 * 2].reshape(-1, 2 * whole.shape[1]) if len(whole) > 1 else whole
         half = 0.5 * np.ptp(pairs, axis=1)
-        heights.append(float(half.mean()))
+        heights.append(half.mean())
         sample = _noise(motion)[0] / np.sqrt(2)
-        scatter = float(half.std(ddof=1) / np.sqrt(len(half))) if len(half) > 1 else 0.0
-        errors.append(float(np.hypot(scatter, sample / np.sqrt(len(half)))))
+        scatter = half.std(ddof=1) / np.sqrt(len(half)) if len(half) > 1 else 0.0
+        errors.append(np.hypot(scatter, sample / np.sqrt(len(half))))
     omega = np.array([float(motion["omega"]) for motion in motions])
     words = np.array(directions, str)
     jumps = jumps_of_runs(omega, np.array(heights), np.array(errors), words)

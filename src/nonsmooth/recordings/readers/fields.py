@@ -132,7 +132,7 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
                 reading.of(run, one.name, f"{blank} blank fields dropped")
             if axis is None:
                 first = 0 if inside is None else int(np.flatnonzero(inside)[0])
-                taken = (at - first) / float(rate or 1.0)
+                taken = (at - first) / (rate or 1.0)
             elif whole and len(held) == table.rows:
                 taken = along  # the same array for all: told at once to be one clock
             else:

@@ -104,7 +104,7 @@ def _forward(
         if gain.size == 0 or gain.max() <= significance**2:
             return [taken[i] for i in sorted(taken)]
         i = int(np.argmax(gain))
-        taken[i] = (float(place[i]), float(error[i]))
+        taken[i] = (place[i], error[i])
         near = range(max(2, i - window), min(len(t) - 3, i + window + 1))
         gain[max(i - 1, 0) : i + 2] = 0.0
         todo = [k for k in near if all(abs(k - j) > 1 for j in taken)]
@@ -133,17 +133,17 @@ def _kink(t: FloatArray, x: FloatArray, i: int, low: int, high: int, variance: f
     found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"xatol": 1e-3 * h, "maxiter": 40})
     if not found.success:
         raise SolveError(f"the instant of a kink near t = {t[i]:.6g} s was not found: {found.message}")
-    tau = float(np.clip(found.x, 1e-3 * h, 0.999 * h))
+    tau = np.clip(found.x, 1e-3 * h, 0.999 * h)
     step = 0.1 * h
     bend = (squares(tau + step) - 2 * squares(tau) + squares(tau - step)) / step**2
     error = math.sqrt(2.0 * variance / bend) if bend > 0 else math.inf
-    return (plain - float(found.fun)) / variance, t[i] + tau, min(error, h / math.sqrt(12.0))
+    return (plain - found.fun) / variance, t[i] + tau, min(error, h / math.sqrt(12.0))
 
 
 def _squares(A: FloatArray, y: FloatArray) -> float:
     """Sum of squares that a fit leaves."""
     R: Any = np.linalg.qr(np.column_stack([A, y]), mode="r")
-    return float(R[-1, -1] ** 2)
+    return R[-1, -1] ** 2
 
 
 _UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
@@ -234,7 +234,7 @@ def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple
     g = -at_zero / slope
     along = np.array([g, 1.0]) / slope
     # Samples of one contact are not independent: some 4 of them say as much as one.
-    return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-slope)
+    return g, 2.0 * math.sqrt(along @ C @ along), -slope
 
 
 def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -279,7 +279,7 @@ def _drive(t: FloatArray, left: FloatArray, free: BoolArray) -> float | None:
         return None
     a, b, c = lines[best - 1 : best + 2]
     place = best + 0.5 * (a - c) / (a - 2 * b + c)
-    return float(2 * np.pi * place * (n - 1) / (8 * n * (t[-1] - t[0])))
+    return 2 * np.pi * place * (n - 1) / (8 * n * (t[-1] - t[0]))
 
 
 def intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, BoolArray]:

@@ -94,7 +94,7 @@ def found_resolution(x: Any) -> float:
         spacing = spacing[spacing > 1e-9 * np.ptp(distinct)]  # equal but for rounding
     if len(spacing) == 0:
         raise ValueError(f"{whose(x)}: all its values are the same; no step can be read off them")
-    step = float(spacing.min())
+    step = spacing.min()
     for _ in range(4):  # the count of each difference grows surer as the step gets better
         counts = np.rint(spacing / step)
         step = float((spacing @ counts) / (counts @ counts))

@@ -69,7 +69,7 @@ class DrivePhase:
         from scipy.stats import chi2
 
         steps = np.diff(self.turn_times) / np.diff(self.turns)
-        seen, gate = float(np.var(steps, ddof=1)), resolution**2 / 6
+        seen, gate = steps.var(ddof=1), resolution**2 / 6
         steady = bool(chi2.sf(seen / gate * (len(steps) - 1), len(steps) - 1) > 1e-4)
         return float(np.sqrt(max(seen - gate, 0.0)) / np.mean(steps)), steady
 
@@ -166,7 +166,7 @@ def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> 
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise ValueError(f"{whose(time)}: the times of the turns must be finite and increase")
     steps = np.diff(times)
-    typical = float(np.median(steps))
+    typical = np.median(steps)
     counts = np.maximum(np.rint(steps / typical), 1).astype(np.int64)
     if len(short := np.flatnonzero(steps < 0.6 * typical)):
         i = short[0]

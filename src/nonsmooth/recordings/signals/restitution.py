@@ -51,14 +51,14 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     t, z = signal(time, height, least=12, purpose="finding flights")
     step = 1.0 / even_rate(t, height, "finding flights")
     bend = np.diff(z, 2) / step**2
-    tail = float(np.quantile(bend, 0.1))
+    tail = np.quantile(bend, 0.1)
     falling = bend[(bend < 0.5 * tail) & (bend > 1.5 * tail)]
     fall = spread = 0.0
     if len(falling) >= least:  # the shortest interval that holds half of the values
         ordered, half = np.sort(falling), max(len(falling) // 2, 1)
         width = ordered[half:] - ordered[:-half]
         k = int(np.argmin(width))
-        fall, spread = float(np.median(ordered[k : k + half + 1])), float(width[k]) / (2 * 0.6745)
+        fall, spread = np.median(ordered[k : k + half + 1]), width[k] / (2 * 0.6745)
     spread = max(spread, 1e-9 * np.ptp(bend))
     tolerance = min(threshold * spread, 0.4 * abs(fall))  # at rest is never in flight, however great the noise
     free = np.concatenate([[True], np.abs(bend - fall) < tolerance, [True]])
@@ -77,9 +77,9 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
         parts.append([y - Q @ (Q.T @ y) for y in (0.5 * s * s, z[a : b + 1])])
         freedom += len(s) - 2
     q, y = map(np.concatenate, zip(*parts, strict=True))
-    acceleration = float(q @ y / (q @ q))
+    acceleration = q @ y / (q @ q)
     left = y - acceleration * q
-    noise = math.sqrt(float(left @ left) / max(freedom, 1))
+    noise = math.sqrt(left @ left / max(freedom, 1))
     first, last = np.array(rows).T
     return xr.Dataset(
         {
@@ -88,7 +88,7 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
             "begin": ("flight", t[first], {"units": "s"}),
             "end": ("flight", t[last], {"units": "s"}),
             "acceleration": labelled((), acceleration, "acceleration in flight"),
-            "acceleration_error": ((), noise / math.sqrt(float(q @ q))),
+            "acceleration_error": ((), noise / math.sqrt(q @ q)),
             "noise": labelled((), noise, "standard deviation of a sample"),
         }
     )
@@ -135,10 +135,10 @@ def restitution(
             continue
         i, j = before.stop - 1, after.start
         left, right = _Side(t[before], z[before], t[i]), _Side(t[after], z[after], t[i])
-        length, roots = float(t[j] - t[i]), np.roots(left.p - right.p)
+        length, roots = t[j] - t[i], np.roots(left.p - right.p)
         real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
         inside = real[(real >= 0.0) & (real <= length)]
-        when = float(inside[0]) if len(inside) == 1 else 0.5 * length  # where the two parabolas meet
+        when = inside[0] if len(inside) == 1 else 0.5 * length  # where the two parabolas meet
         row = {"flight": k, "impact_time": t[i] + when, "duration": t[j] - t[i]}
         found.append((row | {"impact_height": np.polyval(left.p, when)}, left, right, when))
     sides = [side for _, left, right, _ in found for side in (left, right)]
@@ -191,9 +191,9 @@ class _Side:
     def __init__(self, t: FloatArray, z: FloatArray, origin: float) -> None:
         self.p, self.C = np.polyfit(t - origin, z, 2, cov="unscaled")
         left = z - np.polyval(self.p, t - origin)
-        self.squares, self.freedom = float(left @ left), len(t) - 3
+        self.squares, self.freedom = left @ left, len(t) - 3
 
     def slope(self, s: float, noise: float) -> tuple[float, float]:
         """The velocity and its error."""
         along = np.array([2.0 * s, 1.0, 0.0])
-        return float(self.p @ along), noise * math.sqrt(float(along @ self.C @ along))
+        return self.p @ along, noise * math.sqrt(along @ self.C @ along)

@@ -124,7 +124,7 @@ def corner_restitution(
         grid = np.linspace(begin, end, 41)
         apart = np.array([before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid])
         when = first_zero(grid, apart)
-        when = float(grid[np.argmin(np.abs(apart))]) if math.isnan(when) else when
+        when = grid[np.argmin(np.abs(apart))] if math.isnan(when) else when
         heights, point = before.heights(when, points), points[corner]
         moved = (when + half_sample, when - half_sample)
         late, early = (-after.velocity(s, point)[0] / before.velocity(s, point)[0] for s in moved)
@@ -152,20 +152,20 @@ class _Flight:
     """Centre and orientation on one side of an impact: a parabola of known acceleration, a constant spin."""
 
     def __init__(self, t: FloatArray, place: FloatArray, turns: Any, here: slice, fall: float) -> None:
-        self.origin = float(t[here].mean())
+        self.origin = t[here].mean()
         s = t[here] - self.origin
-        self.fall, self.spread, n = fall, float(s @ s), len(s)
+        self.fall, self.spread, n = fall, s @ s, len(s)
         z = place[here, 2] - 0.5 * fall * s * s
-        self.z, self.v = float(z.mean()), float(s @ z) / self.spread
+        self.z, self.v = z.mean(), s @ z / self.spread
         left = z - self.z - self.v * s
-        self.v_error = math.sqrt(float(left @ left) / max(n - 2, 1) / self.spread)
+        self.v_error = math.sqrt(left @ left / max(n - 2, 1) / self.spread)
         self.middle = turns[here][n // 2]
         for _ in range(2):  # one sample's noise, carried along by the spin, would be no residual
             vectors = (turns[here] * self.middle.inv()).as_rotvec()  # turns about the axes of the room
             self.middle = Rotation.from_rotvec(vectors.mean(axis=0)) * self.middle
         self.spin = s @ vectors / self.spread
         left_turn = vectors - vectors.mean(axis=0) - np.outer(s, self.spin)
-        self.spin_error = math.sqrt(float(np.sum(left_turn**2)) / 3 / max(n - 2, 1) / self.spread)
+        self.spin_error = math.sqrt(np.sum(left_turn**2) / 3 / max(n - 2, 1) / self.spread)
 
     def _arms(self, when: float, points: FloatArray) -> FloatArray:
         """Corners about the centre, in the axes of the room."""
@@ -180,7 +180,7 @@ class _Flight:
     def velocity(self, when: float, point: FloatArray) -> tuple[float, float]:
         """Vertical velocity of a corner and its error."""
         arm = self._arms(when, point[None, :])[0]
-        velocity = self.v + self.fall * (when - self.origin) + float(np.cross(self.spin, arm)[2])
+        velocity = self.v + self.fall * (when - self.origin) + np.cross(self.spin, arm)[2]
         return velocity, math.hypot(self.v_error, self.spin_error * math.hypot(arm[0], arm[1]))
 
 

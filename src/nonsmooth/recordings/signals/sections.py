@@ -24,7 +24,7 @@ def first_zero(x: FloatArray, y: FloatArray) -> float:
     if not len(found):
         return np.nan
     i = found[0]
-    return float(x[i] + (x[i + 1] - x[i]) * y[i] / (y[i] - y[i + 1]))
+    return x[i] + (x[i + 1] - x[i]) * y[i] / (y[i] - y[i + 1])
 
 
 class Known(TypedDict, total=False):

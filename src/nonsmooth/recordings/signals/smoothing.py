@@ -128,16 +128,16 @@ class _Nodes:
     ) -> None:
         self.t, self.order, self.impacts = t, order, impacts
         self.known = resolution is not None
-        self.h = float(np.median(np.diff(t)))
+        self.h = np.median(np.diff(t))
         good = np.isfinite(x)
         if resolution is not None:
             count, jitter = resolution / math.sqrt(12.0), noise
         else:
             # A first guess only, which the likelihood corrects: the fourth differences of a smooth signal are noise.
             rough = np.diff(x[good], 4) / math.sqrt(70.0)
-            count, jitter = float(np.sqrt(np.mean(rough**2))) or 1e-9 * np.ptp(x[good]) or 1.0, 0.0
+            count, jitter = np.sqrt(np.mean(rough**2)) or 1e-9 * np.ptp(x[good]) or 1.0, 0.0
         self.sigma = math.hypot(count, jitter)
-        self.offset = float(x[good][0])
+        self.offset = x[good][0]
         stay, *edges = _stays(t, x, resolution) if resolution is not None else (np.ones(len(t)), *np.zeros((3, 0)))
         # kind 0: sample, 1: before an impact, 2: after it, 3: bound of a contact, 4: edge of a count
         places = [t, impacts, impacts, contacts[(contacts > t[0]) & (contacts < t[-1])], edges[0]]
@@ -189,9 +189,9 @@ class _Nodes:
             self.sums,
         )
         if self.known:
-            return float(self.sums[0] + self.sums[1])
+            return self.sums[0] + self.sums[1]
         used = int(np.count_nonzero(np.isfinite(self.r)))
-        return float(used * math.log(self.sums[0] / (used - self.order)) + self.sums[1])
+        return used * math.log(self.sums[0] / (used - self.order)) + self.sums[1]
 
     def likeliest(self) -> FloatArray:
         """The intensities of the largest likelihood: on a grid over all that can matter, then refined."""
@@ -203,11 +203,11 @@ class _Nodes:
         low, high = -power * math.log10(max(len(self.t), 10)) - 2.0, 2.0 * math.log10(np.ptp(self.y) + 1.0) + 3.0
         grid = np.linspace(low, high, max(16, int((high - low) / 1.5)))
         best = int(np.argmin([self.cost(np.full(2, 10.0**g)) for g in grid]))
-        around = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)]))
+        around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
         found = minimize_scalar(
             lambda g: self.cost(np.full(2, 10.0**g)), bounds=around, method="bounded", options={"xatol": 0.01}
         )
-        one = float(found.x)
+        one = found.x
         if not self.inside.any():
             return np.full(2, 10.0**one)
         start = np.array([[one, one], [one - 1.0, one], [one, one + 1.0]])
@@ -251,12 +251,12 @@ class _Nodes:
         attrs = {
             "method": "Kalman smoother (Rauch-Tung-Striebel)",
             "model": model,
-            "intensity": float(q[0]) * sigma**2 / self.h ** (2 * n - 1),
+            "intensity": q[0] * sigma**2 / self.h ** (2 * n - 1),
             "sample_error": sigma,
             "log_likelihood": -0.5 * cost,
         }
         if self.inside.any():
-            attrs["intensity_in_contact"] = float(q[1]) * sigma**2 / self.h ** (2 * n - 1)
+            attrs["intensity_in_contact"] = q[1] * sigma**2 / self.h ** (2 * n - 1)
         found = labelled_motion(self.t, states[sample].T[:3], errors[sample].T[:3], self.impacts, x)
         return found.assign(at_impacts).assign_attrs(attrs)
 
@@ -349,7 +349,7 @@ def savitzky_golay(
     for k, name in enumerate("xva"):
         bias = []
         # Weights of each place in the window; the middle ones serve everywhere but at the ends.
-        norms = [float(np.linalg.norm(savgol_coeffs(window, order, k, step, pos=i))) for i in range(window)]
+        norms = [np.linalg.norm(savgol_coeffs(window, order, k, step, pos=i)) for i in range(window)]
         for part in np.unique(segment):
             here = np.flatnonzero(segment == part)
             if len(here) < window:
@@ -364,5 +364,5 @@ def savitzky_golay(
             errors[k, here] = np.array(norms)[place] * resolution / math.sqrt(12.0)
             finer = savgol_filter(piece, window, min(order + 2, window - 1), deriv=k, delta=step)
             bias.append(finer[half:-half] - states[k, here][half:-half])
-        attrs[f"{name}_bias"] = float(np.sqrt(np.mean(np.concatenate(bias) ** 2)))
+        attrs[f"{name}_bias"] = np.sqrt(np.mean(np.concatenate(bias) ** 2))
     return labelled_motion(t, states, errors, hits, x).assign_attrs(attrs)

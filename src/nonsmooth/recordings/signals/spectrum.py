@@ -238,7 +238,7 @@ class _Shape:
         self.n, self.padding = int(spectrum.attrs["samples"]), int(spectrum.attrs["padding"])
         name = spectrum.attrs["window"]
         self.weights = get_window(ast.literal_eval(name) if name.startswith("(") else name, self.n)
-        self.total = float(self.weights.sum())
+        self.total = self.weights.sum()
 
     def _lines(self, weights: FloatArray) -> FloatArray:
         """Transform of weights about the middle of the record at offsets k / FINE, k = 0, 1, ...; real part."""
@@ -283,7 +283,7 @@ class _Shape:
 
         def misfit(delta: float) -> float:
             left, middle, right = self.at([-1.0 - delta, -delta, 1.0 - delta])
-            return float((right - left) / middle - wanted)
+            return (right - left) / middle - wanted
 
         ends = misfit(-0.75), misfit(0.75)
         if ends[0] * ends[1] >= 0:
@@ -334,4 +334,4 @@ def _noise(spectrum: xr.Dataset, k: int) -> float:
     if len(beside) == 0:
         return math.nan
     # The mean of an exponential distribution from its median; half the sample rate is the band.
-    return np.median(beside) / math.log(2.0) * float(spectrum.attrs["rate"]) / 2.0
+    return np.median(beside) / math.log(2.0) * spectrum.attrs["rate"] / 2.0

@@ -197,9 +197,9 @@ def _slope(t: FloatArray, y: FloatArray, errors: FloatArray) -> tuple[float, flo
     """Slope of a line and its error: by the scatter about it, and at least by the errors of the points."""
     line, covariance = np.polyfit(t, y, 1, cov="unscaled")
     left = y - np.polyval(line, t)
-    power = float(left @ left)
+    power = left @ left
     # Neighbouring blocks that err alike say less.
-    alike = max(float(left[1:] @ left[:-1]) / power, 0.0) if power > 0 else 0.0
+    alike = max(left[1:] @ left[:-1] / power, 0.0) if power > 0 else 0.0
     inflation = (1.0 + alike) / (1.0 - min(alike, 0.8))
     variance = max(power / (len(t) - 2) * inflation, np.mean(errors**2))
     return float(line[0]), math.sqrt(variance * covariance[0, 0])

@@ -36,7 +36,7 @@ def grazing_frequencies(parameters: Mapping[str, float]) -> list[float]:
     ValueError
         A gap that is not positive: that support is pressed at rest, and no motion grazes it from below.
     """
-    m, k, c, rho, g = (float(parameters[name]) for name in ("m", "k", "c", "rho", "g"))
+    m, k, c, rho, g = (parameters[name] for name in ("m", "k", "c", "rho", "g"))
     if not g > 0:
         raise ValueError(f"grazing from below needs a gap g > 0, not {g}")
     # w2^2 - 2 b w2 + (2k/m)^2 - (rho/(m g))^2 = 0 with w2 = omega^2

@@ -85,7 +85,7 @@ class Laboratory:
             return [one.recording.channel(name, one.run) for one in self.session.recordings(procedure)]
 
         angle, force = (channels("springs", name)[0] for name in ("Angle", "Force"))
-        volts = [float(one.settings["voltage"]) for one in self.session.recordings("voltage")]
+        volts = [one.settings["voltage"] for one in self.session.recordings("voltage")]
         pushed, taps = channels("support", "Force"), channels("impulse", "Angle")
         turning = max(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max() for tap in taps)
         values = {

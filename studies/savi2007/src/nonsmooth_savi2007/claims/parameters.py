@@ -206,7 +206,7 @@ def _line(data: Data, key: str) -> Cell:
     """A calibration's slope, and its largest residual relative to its range."""
     picture, found = data["fig08"][key], found_in(data["fig08"][key])
     fitted = float(picture["slope"]) * picture["setting"].values + float(picture["intercept"])
-    left = float(np.abs(picture["reading"].values - fitted).max() / np.ptp(fitted))
+    left = np.abs(picture["reading"].values - fitted).max() / np.ptp(fitted)
     text = f"a line of slope {found.estimate}; its {len(found.runs)} points lie within {100 * left:.2g} % of the range"
     return Cell(text, _built(left < _LEAST_LINE))
 

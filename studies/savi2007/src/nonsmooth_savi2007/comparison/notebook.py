@@ -83,7 +83,7 @@ class GapReference(NamedTuple):
         variance = self.offset.uncertainty**2 + error**2
         if self.offset.rest is not None and abs(self.offset.rest - self.places.rest) < 1e-12:
             # the taps that the gap at rest was counted from: rest falls out of the difference
-            own = self.offset.uncertainty**2 - float(self.places.covariance[0, 0])
+            own = self.offset.uncertainty**2 - self.places.covariance[0, 0]
             variance = max(own, 0.0) + self.places.place(crank_length)[1] ** 2
         return reading + self.offset.value - shift, np.sqrt(variance)
 
@@ -155,7 +155,7 @@ def gap_offset(parameters: Any, session: Session) -> GapOffset:
     ValueError
         If the session has no run with contact.
     """
-    readings = [float(item.settings["gap"]) for item in session.recordings("contact")]
+    readings = [item.settings["gap"] for item in session.recordings("contact")]
     if not readings:
         raise ValueError(f"{session.folder} has no run of 'contact': what the screw read at the identified gap is lost")
     reading = max(set(readings), key=readings.count)
@@ -249,7 +249,7 @@ def session_measurement(
     }
     first = chosen[0].settings
     if "gap" in first:
-        settings["g"] = reference.gap(float(first["gap"]), length)
+        settings["g"] = reference.gap(first["gap"], length)
     if shows == "response":
         # Steps that do not say how they were reached: up as long as the frequency rises.
         omega = [float(motion["omega"]) for motion in motions]
@@ -258,7 +258,7 @@ def session_measurement(
         return measured_response(motions, words), settings
     settings["omega"] = (float(motions[0]["omega"]), float(motions[0]["omega_error"]))
     if shows == "sections":
-        gaps = [reference.gap(float(item.settings["gap"]), length)[0] for item in chosen]
+        gaps = [reference.gap(item.settings["gap"], length)[0] for item in chosen]
         omega = [float(motion["omega"]) for motion in motions]
         if np.ptp(omega) > 1e-2 * np.mean(omega) or len(set(gaps)) < len(gaps):
             raise ValueError(
@@ -270,11 +270,11 @@ def session_measurement(
     (motion,) = motions
     if shows == "motion":
         return motion, settings
-    per, last = k if crank_force is None else crank_force, float(first["crank_length_end"])
+    per, last = k if crank_force is None else crank_force, first["crank_length_end"]
     rise = measured_rise(motion, "rho", per * length, per * last, unit="N")
     moved = np.zeros(rise["section"].shape)
-    moved[:, 0] = [reference.mean(float(rho) / per)[0] for rho in rise["rho"].values]
-    screw = float(first["gap"])
+    moved[:, 0] = [reference.mean(rho / per)[0] for rho in rise["rho"].values]
+    screw = first["gap"]
     error = max(reference.gap(screw, a)[1] for a in (length, last))
     settings = {"omega": settings["omega"], "g": (lambda p: reference.gap(screw, p["rho"] / per)[0], error)}
     return rise.assign(section=(rise["section"] - moved).assign_attrs(rise["section"].attrs)), settings
@@ -304,7 +304,7 @@ def _chosen(session: Session, procedure: str, runs: str | Sequence[str] | None) 
 
 
 def _crank_length(chosen: list[Any]) -> float:
-    lengths = {float(item.settings["crank_length"]) for item in chosen if "crank_length" in item.settings}
+    lengths = {item.settings["crank_length"] for item in chosen if "crank_length" in item.settings}
     if len(lengths) > 1:
         raise ValueError(
             f"the runs have {len(lengths)} crank lengths ({', '.join(f'{a:g}' for a in sorted(lengths))} m): a "

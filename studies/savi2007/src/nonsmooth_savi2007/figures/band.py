@@ -53,7 +53,7 @@ def _errors(settings: Settings) -> xr.Dataset:
         for j, eta in enumerate(etas):
             forms = ((sharp, FINE), (sharp, SMOOTHED.options["rtol"]), (general_form(sharp), FINE))
             for k, (model, rtol) in enumerate(forms):
-                model = model.smoothed(float(eta))
+                model = model.smoothed(eta)
                 run = simulate(model, periods=PERIODS, start=begin, samples=2, method="rkf45", rtol=rtol)
                 difference = (run["u"].values[-1] - truth["u"].values[-1]) / sharp.scale_vector()
                 error[k, i, j] = np.linalg.norm(difference)
@@ -70,7 +70,7 @@ def _errors(settings: Settings) -> xr.Dataset:
 def _grazing(settings: Settings) -> xr.Dataset:
     """Upper frequency of Fig. 9 at which the motion without contact first meets the band; at eta 0, the support."""
     etas = np.concatenate([[0.0], ETAS[2:3] if settings.quick else ETAS])
-    found = np.array([_first_meeting(float(eta)) for eta in etas])
+    found = np.array([_first_meeting(eta) for eta in etas])
     made = xr.Dataset(
         {
             "grazing": ("eta", found, {"long_name": "grazing frequency, bisected", "units": "rad/s"}),

@@ -192,7 +192,7 @@ def _windows(data: Datasets) -> dict[int, tuple[float, float]]:
     found = {}
     for period in np.unique(periods.values[periods.values > 1]):
         at = above["omega"].values[(periods == period).any("start").values]
-        found[int(period)] = (float(at[0]), float(at[-1]))
+        found[int(period)] = (at[0], at[-1])
     return found
 
 

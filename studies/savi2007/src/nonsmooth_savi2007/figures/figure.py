@@ -72,7 +72,7 @@ class Figure:
         """Its place in the report: that of its number; of none, at the end."""
         if self.number is None and self.beside is not None:
             return self.beside + 0.5
-        return 99.0 if self.number is None else float(self.number)
+        return 99.0 if self.number is None else self.number
 
     def draw(self, data: Datasets) -> Canvas:
         """The figure of these data, which pyplot does not list."""

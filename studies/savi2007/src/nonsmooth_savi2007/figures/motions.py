@@ -66,7 +66,7 @@ def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, An
 
 def _value(settings: Mapping[str, Any], name: str) -> float:
     """The value of a setting, which may stand with its uncertainty."""
-    return float(np.atleast_1d(settings[name])[0])
+    return np.atleast_1d(settings[name])[0]
 
 
 def runs_of(found: Motions, parameter: str) -> xr.Dataset:

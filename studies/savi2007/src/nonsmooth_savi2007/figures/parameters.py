@@ -113,7 +113,7 @@ def _compute_table(settings: Settings) -> Datasets:
     bench = settings.bench
     identified = bench.identified.to_dataset()  # first: it reads the session folder only
     truth = load_truth(bench.folder / TRUTH)
-    truth |= {"omega_0": float(np.sqrt(2 * truth["k"] / truth["m"])), "gap_at_rest": truth["g"]}
+    truth |= {"omega_0": np.sqrt(2 * truth["k"] / truth["m"]), "gap_at_rest": truth["g"]}
     units = [UNITS.get(name, NAMES.get(name, ("",))[0]) for name in truth]
     table = xr.Dataset({"value": ("name", list(truth.values())), "unit": ("name", units)}, {"name": list(truth)})
     return {

@@ -78,7 +78,7 @@ def voltage_frequency(runs: Sequence[Run]) -> Finding:
     ValueError
         If there are fewer than three different voltages.
     """
-    volts = np.array([float(run.settings["voltage"]) for run in runs])
+    volts = np.array([run.settings["voltage"] for run in runs])
     drives = [drive_phase(run.passages) for run in runs]
     omega = np.array([drive.omega for drive in drives])
     error = np.array([drive.omega_error for drive in drives])

@@ -234,7 +234,7 @@ def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate,
     slope, intercept, _ = decay_rate(at, height, error)
     begun = time[0] + late
     at = at - begun
-    fine = np.linspace(0.0, float(at[-1]), 200)
+    fine = np.linspace(0.0, at[-1], 200)
     plain = np.exp(intercept + slope * (begun + fine))
     both = envelope(fine, abs(first) * (1 + (natural * late) ** 2 / 2), natural, b, f)
     return picture_data(

@@ -118,7 +118,7 @@ def _slope(run: Run) -> float:
         return 0.0
     x, force = run.positions, np.asarray(run.force.values, float)
     x, force = x - x.mean(), force - force.mean()
-    spread, common = float(x @ x), float(x @ force)
+    spread, common = x @ x, x @ force
     if abs(common) <= _FOLLOWS * np.sqrt(spread * (force @ force)):
         return 0.0
     return common / spread

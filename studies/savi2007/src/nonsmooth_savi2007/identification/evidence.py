@@ -72,12 +72,12 @@ class Run:
     @property
     def gap(self) -> float:
         """Reading of the support's screw (m)."""
-        return float(self.settings["gap"])
+        return self.settings["gap"]
 
     @property
     def crank(self) -> float:
         """Length of the crank (m)."""
-        return float(self.settings["crank_length"])
+        return self.settings["crank_length"]
 
     @property
     def mounted(self) -> bool:

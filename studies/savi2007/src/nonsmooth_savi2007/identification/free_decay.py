@@ -77,7 +77,7 @@ class DecayFit(NamedTuple):
     @property
     def rest(self) -> float:
         """Place of rest (m) in the sensor's count."""
-        return float(self.values[3])
+        return self.values[3]
 
     @property
     def held(self) -> float:
@@ -233,7 +233,7 @@ class _Method(NamedTuple):
             _oscillator(self.friction).with_parameters(dict(zip(names, first[self.used].tolist(), strict=False))),
             [{"x": (part.time - part.time[0], part.x)} for part in parts],
             [*names, "x.offset"],
-            measured={"x": Sensor(resolution=parts[0].run.resolution, offset=float(first[3]))},
+            measured={"x": Sensor(resolution=parts[0].run.resolution, offset=first[3])},
             mode="dry_stick" if self.friction else None,
             tries=1,
             progress=False,

@@ -95,7 +95,7 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, kappa: float) -> Findin
     height = _height(seen, free, decay)
     ends = seen.omega[[last, first]]
     low, high = height(ends)
-    place = float(np.mean(seen.mean[free]))
+    place = seen.mean[free].mean()
     low -= _unseen(limit, seen.amplitude[last], kappa / decay.law[0] ** 2)
     normal = _sensor_error(seen, free, height)
     least, most, depth = _by_push(seen, first, place, decay, kappa)
@@ -168,7 +168,7 @@ def _touching(seen: Steady) -> tuple[int, float]:
     begun, limit = _FIRST, 0.0
     for _ in range(len(seen.mean)):  # the scatter of the means from the free runs, the free runs from the scatter
         free = seen.mean[:begun]
-        limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * seen.resolution)
+        limit = max(_SIGMAS * free.std(ddof=1), _COUNTS * seen.resolution)
         near = np.flatnonzero(np.abs(seen.mean - np.mean(free)) <= limit)
         before, begun = begun, max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
         if begun == before:
@@ -238,5 +238,5 @@ def _height(seen: Steady, free: NDArray[np.bool_], decay: DecayFit) -> Callable[
 def _sensor_error(seen: Steady, free: NDArray[np.bool_], height: Callable[[FloatArray], FloatArray]) -> float:
     """Of a height above the mean, by the scatter of the free runs about the curve, not less than rounding allows."""
     n = int(np.count_nonzero(free))
-    scatter = float(np.std(seen.highest[free] - seen.mean[free] - height(seen.omega[free]), ddof=1))
+    scatter = np.std(seen.highest[free] - seen.mean[free] - height(seen.omega[free]), ddof=1)
     return max(scatter, seen.resolution / np.sqrt(12 * n)) / np.sqrt(min(n, _FIRST))

@@ -101,7 +101,7 @@ class ContactFit(NamedTuple):
                 mine = data["window"].values == k
                 if self._met(i, mine) == 1:
                     time = data["time"].values[mine]
-                    found.append((i, float(time[0]), float(time[-1])))
+                    found.append((i, time[0], time[-1]))
         return found
 
 
@@ -257,8 +257,8 @@ def _touches(run: Run, rest: float) -> bool:
 def _span(run: Run) -> tuple[float, float]:
     """Part of a run that is fitted: from where the car is farthest from the support."""
     early = run.time < run.time[0] + _BEGINS
-    begin = float(run.time[np.argmin(run.positions[early])])
-    return begin, min(float(run.time[-1]), begin + _LONGEST)
+    begin = run.time[np.argmin(run.positions[early])]
+    return begin, min(run.time[-1], begin + _LONGEST)
 
 
 def _excess(found: ParameterSet, decay: DecayFit) -> float:

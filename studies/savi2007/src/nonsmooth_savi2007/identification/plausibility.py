@@ -140,7 +140,7 @@ def not_driven(seen: Steady) -> str:
 def _travel(run: Run) -> float:
     """Way from end to end (m), a thousandth of the samples on either side left out."""
     low, high = np.nanquantile(run.positions, (0.001, 0.999))
-    return float(high - low)
+    return high - low
 
 
 def _length(run: Run) -> float:

@@ -105,7 +105,7 @@ def harmonics_of(run: Run, values: Any) -> tuple[HarmonicFit, float, float]:
     inside = time <= time[0] + whole * drive.period
     fitted = harmonic_fit(time[inside], values[inside], drive.omega, HARMONICS)
     # the gate's times to 0.1 ms each: all of them together tell the phase
-    return fitted, drive.omega, float(np.mean(drive.turn_times - drive.period * drive.turns))
+    return fitted, drive.omega, (drive.turn_times - drive.period * drive.turns).mean()
 
 
 def steady(runs: Sequence[Run]) -> Steady:
@@ -145,4 +145,4 @@ def _lean(v: FloatArray) -> float:
     # the share of each step in which v is positive
     step = np.where(before == after, 1.0, np.abs(after - before))
     part = np.where(before * after < 0, np.maximum(before, after) / step, (before + after > 0).astype(float))
-    return 2 * float(np.mean(part)) - 1
+    return 2 * part.mean() - 1

@@ -54,7 +54,7 @@ def records(
         wander, period = rig.wander(procedure, i, omega), 2 * np.pi / omega
         gap = NO_SUPPORT if setting.gap is None else rig.true_gap(setting.gap)
         set_to = rig.parameters(omega=omega, crank_length=setting.crank_length, g=gap) | wander
-        before, phase = int(np.ceil(settle / period)), float(rng.uniform())
+        before, phase = int(np.ceil(settle / period)), rng.uniform()
         # Whole periods in all, so that the next run can begin where this one ends.
         recorded = int(np.ceil(phase + (setting.duration + 1 / sensors.RATE) / period))
         time, at = sensors.instants(rig, rng, setting.duration)
@@ -128,10 +128,10 @@ def response(
     With a ``gap`` (m) Figs. 9 and 10. ``after``: runs that follow, for figures with the support mounted those without
     it.
     """
-    natural = float(np.sqrt(2 * rig.truth["k"] / rig.truth["m"]))
+    natural = np.sqrt(2 * rig.truth["k"] / rig.truth["m"])
     steps = [voltage_for(rig, natural * r) for r in RELATIVE] if voltages is None else list(voltages)
     settings = [
-        SteadyRun(voltage, float(length), gap, duration, {"direction": direction})
+        SteadyRun(voltage, length, gap, duration, {"direction": direction})
         for length in crank_lengths
         for direction, row in (("up", steps), ("down", steps[::-1]))
         for voltage in row
@@ -150,9 +150,9 @@ def grazing(
 ) -> Recording:
     """Frequency steps down through the first contact, ``step`` rad/s apart, the motion carried along."""
     rng = rig.generator("grazing", 9999)
-    centre = graze_frequency(rig, crank_length, gap) + float(rng.uniform(-2, 2)) * step
+    centre = graze_frequency(rig, crank_length, gap) + rng.uniform(-2, 2) * step
     omegas = np.arange(centre + half_width, centre - half_width, -step)
-    voltages = list(dict.fromkeys(voltage_for(rig, float(omega)) for omega in omegas))
+    voltages = list(dict.fromkeys(voltage_for(rig, omega) for omega in omegas))
     settings = [SteadyRun(voltage, crank_length, gap, duration, {"direction": "down"}) for voltage in voltages]
     return records(rig, "grazing", settings, carry=True)
 
@@ -167,7 +167,7 @@ def graze_frequency(rig: VirtualRig, crank_length: float, gap: float) -> float:
         along = np.sqrt(max((p.k * crank_length) ** 2 - (dry + p.c * omega * room) ** 2, 0.0))
         before, omega = omega, np.sqrt((2 * p.k + along / room) / p.m)
         if abs(omega - before) < 1e-9 * omega:
-            return float(omega)
+            return omega
     raise SolveError(
         f"no frequency above resonance at which a crank of {crank_length:g} m reaches a gap of {room:g} m was found; "
         "use a longer crank or a smaller gap"

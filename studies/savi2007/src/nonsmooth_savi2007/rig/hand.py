@@ -110,7 +110,7 @@ def impulse(
     runs = []
     for i, velocity in enumerate(velocities):
         rng = rig.generator("impulse", i)
-        start = {"v": velocity * float(rng.uniform(0.9, 1.1)), **_stuck(rig, i)}
+        start = {"v": velocity * rng.uniform(0.9, 1.1), **_stuck(rig, i)}
         slips = rig.truth["slipped_tap"] == i + 1
         runs.append(_decay(rig, rng, f"Run #{i + 1}", system, start, duration, slips=slips))
     return rig.recording("impulse", runs)
@@ -123,7 +123,7 @@ def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
     if not run:
         return {"x": rig.truth["sensor_zero"]}
     held = rig.truth["friction"] / (2 * rig.truth["k"])
-    return {"x": held * float(np.random.default_rng([rig.seed, 4, run]).uniform(-0.9, 0.9))}
+    return {"x": held * np.random.default_rng([rig.seed, 4, run]).uniform(-0.9, 0.9)}
 
 
 def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
@@ -134,7 +134,7 @@ def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
     runs = []
     for i in range(n):
         rng = rig.generator("drop", i)
-        start = {"x": -sag * float(rng.uniform(0.6, 1.0))}
+        start = {"x": -sag * rng.uniform(0.6, 1.0)}
         runs.append(_decay(rig, rng, f"Run #{i + 1}", system, start, duration))
     return rig.recording("drop", runs)
 
@@ -150,7 +150,7 @@ def _decay(
     slips: bool = False,
 ) -> Run:
     """A run that begins to record a little before the motion begins."""
-    begin = float(rng.uniform(0.4, 1.0))
+    begin = rng.uniform(0.4, 1.0)
     time, at = sensors.instants(rig, rng, begin + duration)
     moving = at >= begin
     states, _ = simulated(

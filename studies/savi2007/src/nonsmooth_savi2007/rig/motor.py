@@ -50,7 +50,7 @@ def mean_position(rig: VirtualRig, crank_length: float) -> float:
     To first order :math:`s [a^2 / (8 L) - a \epsilon \cos(\beta) / 4]`: the string's part and the uneven turning's.
     """
     turn = np.arange(4096) * (2 * np.pi / 4096)
-    moved = float(np.mean(drive(turn, rig.named_parameters(omega=1.0), crank_length))) / 2
+    moved = np.mean(drive(turn, rig.named_parameters(omega=1.0), crank_length)) / 2
     return rig.truth["motor_side"] * moved
 
 
@@ -76,7 +76,7 @@ def voltage(rig: VirtualRig, *, voltages: Sequence[float] = range(2, 13), turns:
     runs = []
     for i, setting in enumerate(voltages):
         rng = rig.generator("voltage", i)
-        omega = frequency(rig, float(setting))
+        omega = frequency(rig, setting)
         begin = rng.uniform(0, 2 * np.pi / omega)
         end = begin + turns * 2 * np.pi / omega
         crossed = passages(rig, omega, begin, end, **rig.wander("voltage", i, omega)) - begin
@@ -99,7 +99,7 @@ def crank(
         begin = rng.uniform(0, 2 * np.pi / omega)
         time, at = sensors.instants(rig, rng, duration)
         wander = rig.wander("crank", i, omega)
-        p = rig.named_parameters(omega=omega, crank_length=float(length), **wander)
+        p = rig.named_parameters(omega=omega, crank_length=length, **wander)
         pulled = rig.truth["motor_side"] * p.k * drive(begin + at, p, p.crank_length, rig.wanders)
         crossed = passages(rig, omega, begin, begin + duration, **wander) - begin
         channels = {"Force": sensors.force(rig, rng, name, time, pulled), "Turn": sensors.turns(rig, crossed)}
