@@ -204,7 +204,7 @@ def _others(fit: ResponseFit) -> dict[str, Estimate]:
 
 def _notes(fit: ResponseFit, slope: FloatArray) -> list[str]:
     """Notes for a reader."""
-    unstable = int(np.count_nonzero(slope < 0))
+    unstable = np.count_nonzero(slope < 0)
     said = [
         f"{unstable} of {len(slope)} points lie on an unstable middle part (d ln F / d ln a < 0); the least slope "
         f"is {slope.min():.2f}, that of a linear mode 1"

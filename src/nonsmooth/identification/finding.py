@@ -186,7 +186,7 @@ class Estimate:
     @property
     def relative(self) -> float:
         """Standard uncertainty over the value's size."""
-        return self.uncertainty / abs(self.value) if self.value else float("inf")
+        return self.uncertainty / abs(self.value) if self.value else np.inf
 
     @property
     def expanded(self) -> float:

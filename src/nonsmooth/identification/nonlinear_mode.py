@@ -65,31 +65,31 @@ class NonlinearMode:
 
     def square(self, amplitude: ArrayLike) -> FloatArray:
         """omega_n^2 at these amplitudes (rad^2/s^2)."""
-        return np.asarray(interpolation(self.knots, amplitude) @ self.squares)
+        return interpolation(self.knots, amplitude) @ self.squares
 
     def damping(self, amplitude: ArrayLike) -> FloatArray:
         """D = 2 zeta omega_n at these amplitudes (1/s)."""
-        return np.asarray(np.exp(interpolation(self.knots, amplitude) @ self.log_damping))
+        return np.exp(interpolation(self.knots, amplitude) @ self.log_damping)
 
     def natural_frequency(self, amplitude: ArrayLike) -> FloatArray:
         """omega_n / 2 pi at these amplitudes (Hz)."""
-        return np.asarray(np.sqrt(self.square(amplitude)) / (2 * np.pi))
+        return np.sqrt(self.square(amplitude)) / (2 * np.pi)
 
     def damping_ratio(self, amplitude: ArrayLike) -> FloatArray:
         """zeta at these amplitudes."""
-        return np.asarray(self.damping(amplitude) / (2 * np.sqrt(self.square(amplitude))))
+        return self.damping(amplitude) / (2 * np.sqrt(self.square(amplitude)))
 
     def stiffness(self, amplitude: ArrayLike, omega: ArrayLike) -> ComplexArray:
         """Force by displacement, m (omega_n^2 - Omega^2 + i D Omega), N/m."""
         w = np.asarray(omega, float)
-        return np.asarray(self.mass * (self.square(amplitude) - w**2 + 1j * self.damping(amplitude) * w))
+        return self.mass * (self.square(amplitude) - w**2 + 1j * self.damping(amplitude) * w)
 
     def slope(self, amplitude: ArrayLike, omega: ArrayLike) -> FloatArray:
         r"""d ln F / d ln a at a fixed frequency: 1 if linear, 0 at a fold, negative on the unstable middle part."""
         a, w = np.asarray(amplitude, float), np.asarray(omega, float)
         G, D, change = self.square(a), self.damping(a), interpolation(self.knots, a, 1)
         turn = change @ self.squares + 1j * w * D * (change @ self.log_damping)
-        return np.asarray(1.0 + np.real(a * turn / (G - w**2 + 1j * w * D)))
+        return 1.0 + np.real(a * turn / (G - w**2 + 1j * w * D))
 
     def response(self, force: float, *, points: int = 400, low: float | None = None) -> xr.Dataset:
         """The response to a force of constant amplitude, along its curve: up one side, over the top, down the other.
@@ -290,7 +290,7 @@ class ResponseFit:
         """Natural frequencies by the tops of the curves; damping by the width of the lowest, the least bent of them."""
         size = np.abs(self.measured)
         gain = size if self.force is None else size / self.force
-        tops = [int(np.argmax(np.where(self.curve == c, gain, 0.0))) for c in range(len(self.names))]
+        tops = [np.argmax(np.where(self.curve == c, gain, 0.0)) for c in range(len(self.names))]
         lowest, *_ = tops = sorted(tops, key=lambda i: size[i])
         w, h = (v[self.curve == self.curve[lowest]] for v in (self.omega, gain))
         step = np.median(np.abs(np.diff(w))) if len(w) > 1 else 0.01 * w[0]

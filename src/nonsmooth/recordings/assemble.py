@@ -63,7 +63,7 @@ def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
         where += f" (and {len(group) - 1} sampled with it)"
     bad = np.flatnonzero(~np.isfinite(first.axis))
     if len(bad):
-        raise reading.error(first.place(int(bad[0])), f"{where}: the {axis} is not a finite number")
+        raise reading.error(first.place(bad[0]), f"{where}: the {axis} is not a finite number")
 
     def note(sentence: str) -> None:
         for trace in group:
@@ -97,7 +97,7 @@ def _clock(trace: Trace, where: str, reading: Reading, note: Callable[[str], Non
     time = trace.axis
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
-        i = int(back[0])
+        i = back[0]
         raise reading.error(
             trace.place(i + 1),
             f"{where}: time goes back from {time[i]:.9g} s to {time[i + 1]:.9g} s; if a new run begins here, "

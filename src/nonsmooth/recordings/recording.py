@@ -46,7 +46,7 @@ def examine(time: FloatArray) -> Sampling:
     steps = np.diff(time)
     repeated = int(np.count_nonzero(steps == 0))
     if len(steps) == 0 or time[-1] == time[0]:
-        return Sampling(float("nan"), True, repeated, (), None)
+        return Sampling(np.nan, True, repeated, (), None)
     change = _change_of_rate(steps)
     typical = np.median(steps)
     if typical == 0 or repeated > len(steps) // 10:
@@ -61,7 +61,7 @@ def examine(time: FloatArray) -> Sampling:
     else:
         gaps, rate = (), 1.0 / typical
     expected = time[0] + np.concatenate([[0.0], np.cumsum(counts if gaps else np.ones(len(steps)))]) / rate
-    regular = change is None and not gaps and bool(np.max(np.abs(time - expected)) * rate < 0.5)
+    regular = change is None and not gaps and (np.max(np.abs(time - expected)) * rate < 0.5)
     return Sampling(rate, regular, repeated, gaps, change)
 
 
@@ -98,7 +98,7 @@ def _change_of_rate(steps: FloatArray) -> tuple[int, float, float] | None:
     # One block is jitter, a gap, or the change itself inside a block: two in a row, or all of the rest, are a change.
     for i in np.flatnonzero(away):
         rest = away[i:]
-        if len(rest) >= 2 and bool(rest[:2].all()):
+        if len(rest) >= 2 and rest[:2].all():
             after = np.median(positive[i + 1 : i + 5])
             if abs(after / reference - 1) > threshold:
                 # The block only says about where; the first of its steps that is nearer to the new one says it.

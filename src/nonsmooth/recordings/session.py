@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import tomllib
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -93,12 +93,11 @@ class Entry(NamedTuple):
 
 def apparatus_of(given: Any, where: str) -> Mapping[str, Quantity]:
     """The table ``[apparatus]``, checked."""
-    table = table_of(given, where)
-    check_keys(table, APPARATUS, where, "a key")
+    table = table_of(given, where, APPARATUS)
     known = {}
     for name, value in table.items():
         stated = value if isinstance(value, dict) else {"value": value}
-        check_keys(stated, ("value", "uncertainty"), f"{where}, {name}", "a key")
+        table_of(stated, f"{where}, {name}", ("value", "uncertainty"))
         if "value" not in stated:
             raise ValueError(f"{where}, {name}: needs `value`")
         quantity = Quantity(**{key: real_number(one, f"{where}, {name}: {key}") for key, one in stated.items()})
@@ -110,8 +109,7 @@ def apparatus_of(given: Any, where: str) -> Mapping[str, Quantity]:
 
 def entry_of(given: Any, folder: Path, where: str) -> Entry:
     """One table ``[[recording]]``, checked; its file must be there."""
-    table = table_of(given, where)
-    check_keys(table, ("file", "procedure", "runs", "read"), where, "a key")
+    table = table_of(given, where, ("file", "procedure", "runs", "read"))
     for key in ("file", "procedure", "runs"):
         if key not in table:
             raise ValueError(f"{where}: needs `{key}`")
@@ -130,8 +128,8 @@ def entry_of(given: Any, folder: Path, where: str) -> Entry:
         if name in runs:
             raise ValueError(f"{where}: run {name!r} is named twice")
         runs[name] = settings
-    read = table_of(table.get("read", {}), f"{where}, read")
-    check_keys(read, ("format", *vars(Options())), f"{where}, read", "an option of load_recording")
+    known = "format", *vars(Options())
+    read = table_of(table.get("read", {}), f"{where}, read", known, "an option of load_recording")
     options = dict(read)
     if isinstance(options.get("columns"), dict):  # TOML has lists where load_recording takes (column, unit)
         options["columns"] = {k: tuple(v) if isinstance(v, list) else v for k, v in options["columns"].items()}
@@ -139,8 +137,7 @@ def entry_of(given: Any, folder: Path, where: str) -> Entry:
 
 
 def _run(given: Any, procedure: str, where: str) -> tuple[str, Mapping[str, Any]]:
-    table = dict(table_of(given, where))
-    check_keys(table, ("run", *SETTINGS), where, "a setting")
+    table = dict(table_of(given, where, ("run", *SETTINGS), "a setting"))
     name = table.pop("run", None)
     if not isinstance(name, str) or not name:
         raise ValueError(f'{where}: needs run = "..." with the name of the run in the file')
@@ -157,10 +154,11 @@ def _run(given: Any, procedure: str, where: str) -> tuple[str, Mapping[str, Any]
     return name, MappingProxyType(table)
 
 
-def table_of(value: Any, where: str) -> Mapping[str, Any]:
-    """``value`` where it is a table."""
+def table_of(value: Any, where: str, known: Iterable[str], kind: str = "a key") -> Mapping[str, Any]:
+    """``value`` where it is a table of known keys."""
     if not isinstance(value, dict):
         raise ValueError(f"{where} must be a table with keys, got {value!r}")
+    check_keys(value, known, where, kind)
     return value
 
 
@@ -287,9 +285,8 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataFileError(f"{notebook}: is not a TOML file: {error}") from None
     where = str(notebook)
-    check_keys(document, ("session", "apparatus", "recording"), where, "a table")
-    head = table_of(document.get("session", {}), f"{where}, [session]")
-    check_keys(head, ("title", "synthetic"), f"{where}, [session]", "a key")
+    table_of(document, where, ("session", "apparatus", "recording"), "a table")
+    head = table_of(document.get("session", {}), f"{where}, [session]", ("title", "synthetic"))
     title, synthetic = head.get("title", place.name), head.get("synthetic", False)
     if not isinstance(title, str) or not isinstance(synthetic, bool):
         raise TypeError(f"{where}, [session]: title is a text and synthetic true or false, got {dict(head)!r}")

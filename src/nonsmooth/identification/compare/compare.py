@@ -167,8 +167,7 @@ def compare(
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
 
-        own = units_of(theory)[states[0]]
-        variables = compare_response(measured, model, name=name, state=states[0], own=own)
+        variables = compare_response(measured, model, name=name)
     elif kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
 

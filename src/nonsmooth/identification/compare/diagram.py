@@ -43,7 +43,7 @@ def compare_diagram(
     if model.system is not None:
         sections, periods = diagram(model.system)
     else:
-        grid = np.asarray(theory[name].values, float)
+        grid = theory[name].values
         words = np.atleast_1d(theory["direction"].values).astype(str).tolist()
         whole = theory["section"].sel(state=model.states).transpose(..., name, "iterate", "state").values
         sections = whole.reshape(-1, *whole.shape[-3:])
@@ -112,8 +112,8 @@ def _measured(measured: xr.Dataset, name: str, model: Model) -> tuple[FloatArray
         at = np.repeat(measured[name].values.astype(float), stacked.shape[1])
         points, found = stacked.reshape(-1, stacked.shape[2]), np.repeat(numbers, stacked.shape[1])
         good = np.isfinite(points).all(axis=1)
-        return at[good], points[good], np.asarray(found, np.int64)[good]
-    points, at = section.transpose("iterate", "state").values, np.asarray(measured[name].values, float)
+        return at[good], points[good], found[good]
+    points, at = section.transpose("iterate", "state").values, measured[name].values
     if at.shape != points.shape[:1]:
         raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
     good = np.isfinite(points).all(axis=1)

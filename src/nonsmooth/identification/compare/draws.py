@@ -189,7 +189,7 @@ def known_together(parameters: Any, allowed: Container[str]) -> tuple[list[str],
     covariance = getattr(parameters, "covariance", None)
     names = [] if covariance is None else [str(name) for name in covariance[covariance.dims[0]].values]
     held = [i for i, name in enumerate(names) if name in parameters and name in allowed]
-    matrix = np.zeros((0, 0)) if covariance is None else np.asarray(covariance.values, float)
+    matrix = np.zeros((0, 0)) if covariance is None else covariance.values
     return [names[i] for i in held], matrix[np.ix_(held, held)]
 
 

@@ -146,7 +146,7 @@ def _periods(
     if low > 0 and high == 2 * low and (apart := _doubled(single, doubled, scale, low)) is not None:
         by = ", ".join(f"{far:.2g} in {name}" for far, name in zip(apart, states, strict=True))
         words = f"on either side of a flip: the {whose} motion is doubled, its section points part by {by}"
-    coexisting = np.asarray(predicted.coexisting, np.int64)
+    coexisting = predicted.coexisting
     return {
         "measured_period_number": labelled((), np.int64(number), "measured period number (0: none found)"),
         "theory_period_number": labelled(
@@ -201,7 +201,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
     distances = (np.nan, np.nan, np.nan)
     scatter = None
     if closed:
-        length = int(np.lcm(number, predicted.period_number))
+        length = np.lcm(number, predicted.period_number)
         mean, spread = mean_orbit(folded, number)
         a, scatter = common_length(mean, number, length), common_length(spread, number, length)
         b = common_length(predicted.orbit, predicted.period_number, length)

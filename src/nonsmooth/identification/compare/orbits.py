@@ -49,7 +49,7 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
     turns, values = np.asarray(phase, float), np.asarray(u, float)
     rises = np.diff(turns)
     if (rises < 0).any():
-        i = int(np.argmax(rises < 0))
+        i = np.argmax(rises < 0)
         raise ValueError(
             f"the phase goes back from {turns[i]:.6g} to {turns[i + 1]:.6g} forcing periods (sample {i + 1})"
         )
@@ -84,13 +84,12 @@ def _cubic(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
     return np.einsum("ij,ijk->ik", products / apart.prod(axis=2), y[nodes])
 
 
-def mean_orbit(folded: ArrayLike, period_number: int) -> tuple[FloatArray, FloatArray]:
+def mean_orbit(folded: FloatArray, period_number: int) -> tuple[FloatArray, FloatArray]:
     """The orbit over ``period_number`` forcing periods, averaged over the record (periods, grid, states), and the
     standard deviation of one pass about it (NaN from a single pass), both (period_number * grid, states).
     """
-    values = np.asarray(folded, float)
-    passes = len(values) // period_number
-    stacked = values[: passes * period_number].reshape(passes, period_number * values.shape[1], values.shape[2])
+    passes = len(folded) // period_number
+    stacked = folded[: passes * period_number].reshape(passes, period_number * folded.shape[1], folded.shape[2])
     stacked = stacked[np.isfinite(stacked).all(axis=(1, 2))]
     if not len(stacked):
         raise ValueError("no pass of the orbit is without missing samples")
@@ -120,9 +119,8 @@ class OrbitDistance(NamedTuple):
     phase_shift: float
 
 
-def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
+def orbit_distance(x: FloatArray, y: FloatArray, periods: int) -> OrbitDistance:
     """Normalised distance of two orbits, each (periods * grid, states) on equal grids of phase."""
-    x, y = np.asarray(a, float), np.asarray(b, float)
     size = np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0)))
     size = np.where(size > 0, size, 1.0)
     n, states = x.shape
@@ -214,12 +212,11 @@ def wasserstein(a: ArrayLike, b: ArrayLike, seed: int = 0) -> float:
     return cost[linear_sum_assignment(cost)].mean()
 
 
-def block_length(points: ArrayLike) -> int:
+def block_length(cloud: FloatArray) -> int:
     """Successive points that are still alike: the lag beyond which their mean distance is that of any two points.
 
     At most a twentieth of the points, so that random halves of blocks can be drawn.
     """
-    cloud = np.asarray(points, float)
     n = len(cloud)
     longest = max(1, n // FEWEST_BLOCKS)
     overall = pdist(cloud[:: max(1, n // 1000)]).mean()
@@ -248,7 +245,7 @@ def cloud_distance(
     rng = np.random.default_rng(seed)
     xx, yy, xy = cdist(x, x), cdist(y, y), cdist(x, y)
     pairs = [_halves(len(x), length, rng) for _ in range(splits)]
-    size = int(pairs[0][0].sum())
+    size = pairs[0][0].sum()
     others = [_parts(len(y), length, size, rng) for _ in range(splits)]
     (left, right), (first, second) = (np.array(rows, float).transpose(1, 2, 0) for rows in (pairs, others))
     to_left, to_right, to_first, to_second = xx @ left, xx @ right, yy @ first, yy @ second
@@ -269,7 +266,7 @@ def _mean(part: FloatArray, product: FloatArray, other: FloatArray) -> FloatArra
 def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[BoolArray, BoolArray]:
     """Two random halves of n points, in blocks; what does not fill a pair of blocks is left out at a random end."""
     count = n // (2 * block)
-    first = int(rng.integers(0, n - 2 * count * block + 1))
+    first = rng.integers(0, n - 2 * count * block + 1)
     owner = np.repeat(rng.permutation(np.arange(2 * count) % 2), block)
     halves = np.zeros((2, n), bool)
     halves[owner, np.arange(first, first + len(owner))] = True

@@ -59,7 +59,7 @@ def measured_period(
     if not (np.isfinite(sigma).all() and (sigma > 0).all()):
         raise ValueError(f"noise must be a positive standard error for each state, got {sigma.tolist()}")
     order = 2 if drifting else 1
-    count = int(np.isfinite(cloud).all(axis=(1, 2)).sum())
+    count = np.isfinite(cloud).all(axis=(1, 2)).sum()
     longest = min(max_period, (count - FEWEST_RETURNS) // order)
     if longest < 1:
         raise ValueError(
@@ -165,9 +165,9 @@ def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, word: str, 
         return nothing
     largest, rho, size = best
     # The square root law and its next order hold near the flip: from half of the largest square on.
-    first = int(np.flatnonzero(size**2 > 0.5 * largest**2).max()) + 1
+    first = np.flatnonzero(size**2 > 0.5 * largest**2).max() + 1
     rho, size = rho[first:], size[first:]
-    seen = int(np.count_nonzero(size > 3.0))
+    seen = np.count_nonzero(size > 3.0)
     if seen < FEWEST:
         return nothing
     stop = min(len(size), 2 * seen + FEWEST)

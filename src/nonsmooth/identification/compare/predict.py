@@ -160,7 +160,7 @@ def from_result(model: Model, phases: list[float]) -> Prediction:
                 "the phase of the drive is not known: give `phase` (in forcing periods) over time, or omega"
             )
         phase = result["phase"] if "phase" in result else result["time"] * float(result["omega"]) / (2 * np.pi)
-        turns = np.asarray(phase.values, float)
+        turns = phase.values
         whole = fold(turns, result["u"].values, model.grid)
         sections = [fold(turns - phase, result["u"].values, 8)[:, 0] for phase in phases]
         number = _number(whole, model.max_period)

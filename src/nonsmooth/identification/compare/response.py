@@ -13,6 +13,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Model, intervals
+from nonsmooth.identification.measured_units import units_of
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
 
@@ -26,8 +27,8 @@ class AmplitudeJump(NamedTuple):
 
     value: float
     half: float = 0.0
-    before: float = float("nan")
-    after: float = float("nan")
+    before: float = np.nan
+    after: float = np.nan
 
 
 Jumps = Mapping[str, Sequence[AmplitudeJump]]
@@ -124,11 +125,10 @@ def nearest_alike(ours: Any, theirs: Any, our_kinds: Any, their_kinds: Any) -> d
 FINE = 301  # values of the predicted curve
 
 
-def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: str, own: str) -> dict[str, Any]:
-    """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each.
-
-    ``own`` is the unit of the state."""
-    runs = _runs(measured, name, state)
+def compare_response(measured: xr.Dataset, model: Model, *, name: str) -> dict[str, Any]:
+    """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
+    state = model.states[0]
+    own, runs = units_of(model.theory)[state], _runs(measured, name, state)
     unit, at_runs = measured[name].attrs.get("units", "1"), np.full(len(runs["value"]), np.nan)
     directions = [word for word in ("up", "down") if (runs["direction"] == word).any()]
     parts = [runs["direction"] == word for word in directions]
@@ -216,7 +216,7 @@ def _given(theory: xr.Dataset, name: str, state: str, directions: list[str]) -> 
     if missing := [word for word in directions if word not in words]:
         raise ValueError(f"runs were made {' and '.join(missing)}, the theory has only: {', '.join(words)}")
     chosen = heights.transpose(name, "direction").isel(direction=[words.index(word) for word in directions])
-    return np.asarray(chosen[name].values, float), np.asarray(chosen.values, float)
+    return chosen[name].values, chosen.values
 
 
 def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jumps:

@@ -127,11 +127,11 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
             whole = inside is None and len(rows) == table.rows
             mine = slice(None) if inside is None else inside[rows]
             at, values = rows[mine], np.ascontiguousarray(one.values[mine], np.float64)
-            blank = (len(held) if inside is None else int(np.count_nonzero(inside[held]))) - len(at)
+            blank = (len(held) if inside is None else np.count_nonzero(inside[held])) - len(at)
             if blank and len(at):
                 reading.of(run, one.name, f"{blank} blank fields dropped")
             if axis is None:
-                first = 0 if inside is None else int(np.flatnonzero(inside)[0])
+                first = 0 if inside is None else np.flatnonzero(inside)[0]
                 taken = (at - first) / (rate or 1.0)
             elif whole and len(held) == table.rows:
                 taken = along  # the same array for all: told at once to be one clock
@@ -140,7 +140,7 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
                 missing = at[held[place] != at] if len(held) else at
                 if len(missing):
                     complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {reading.axis}"
-                    raise reading.error(row_of(int(missing[0]), table.lines), complaint)
+                    raise reading.error(row_of(missing[0], table.lines), complaint)
                 taken = along[place]
             lines = None if table.lines is None else table.lines[at]
             yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
@@ -192,11 +192,11 @@ def _runs(table: FieldTable, numbers: Field | None, reading: Reading) -> list[tu
     if numbers is None:
         return [(table.run, None)]
     if numbers.rows is not None and len(numbers.rows) != table.rows:
-        missing = int(np.setdiff1d(np.arange(table.rows), numbers.rows)[0])
+        missing = np.setdiff1d(np.arange(table.rows), numbers.rows)[0]
         raise reading.error(row_of(missing, table.lines), "the column that numbers the runs is blank")
     values = np.asarray(numbers.values, float)
     if not np.isfinite(values).all():
-        bad = int(np.flatnonzero(~np.isfinite(values))[0])
+        bad = np.flatnonzero(~np.isfinite(values))[0]
         raise reading.error(row_of(bad, table.lines), f"the number of the run is {values[bad]}")
     found, first = np.unique(values, return_index=True)
     if len(found) > MAX_COLUMNS:
@@ -233,7 +233,7 @@ def seconds_of(axis: Field, lines: IntArray | None, reading: Reading) -> tuple[F
     plain = [text.replace(",", ".") for text in texts] if given is None else texts
     read = pandas.to_datetime(plain, format=given or "ISO8601", utc=True, errors="coerce")
     if read.hasnans:
-        raise _unread(texts, int(np.flatnonzero(read.isna())[0]), axis, lines, reading)
+        raise _unread(texts, np.flatnonzero(read.isna())[0], axis, lines, reading)
     if not len(read):
         return np.empty(0), ""
     return np.asarray((read - read[0]).total_seconds(), float), str(read[0].isoformat())

@@ -54,7 +54,7 @@ def signal(
         raise ValueError(f"{name}: {count} of its times are not finite numbers; remove those samples")
     back = np.flatnonzero(np.diff(t) <= 0)
     if len(back):
-        i = int(back[0])
+        i = back[0]
         what = "stands twice" if t[i + 1] == t[i] else f"goes back to {t[i + 1]:.9g} s"
         raise ValueError(
             f"{name}: time {t[i]:.9g} s {what} (sample {i + 1}); export more digits of the times, or cut there"

@@ -128,7 +128,7 @@ def _kink(t: FloatArray, x: FloatArray, i: int, low: int, high: int, variance: f
         return _squares(np.column_stack([A, np.maximum(s - tau, 0.0)]), y)
 
     grid = h * np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-    k = int(np.argmin([squares(tau) for tau in grid]))
+    k = np.argmin([squares(tau) for tau in grid])
     bounds = (grid[max(k - 1, 0)], grid[min(k + 1, 4)])
     found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"xatol": 1e-3 * h, "maxiter": 40})
     if not found.success:
@@ -252,7 +252,7 @@ def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: BoolAr
         left = a - A @ p
         spread = 1.4826 * np.median(np.abs(left[free] - np.median(left[free])))
         again = left > -max(4.0 * spread, 3.0 * np.median(found["a_error"].values))
-        changed, free = int(np.count_nonzero(again != free)), again
+        changed, free = np.count_nonzero(again != free), again
         if not changed:
             break
     else:

@@ -77,7 +77,7 @@ class HarmonicFit:
         t = np.asarray(time, float)
         j = np.arange(1, len(self.amplitudes) + 1)
         angle = np.multiply.outer(t, j * self.omega / self.subharmonic) - self.phases
-        return np.asarray(self.mean + np.cos(angle) @ self.amplitudes)
+        return self.mean + np.cos(angle) @ self.amplitudes
 
 
 def fit(

@@ -84,7 +84,7 @@ class DrivePhase:
 def _straight(at: FloatArray, x: Any, y: Any, slope: float) -> FloatArray:
     """Straight from point to point, and with this slope beyond the first and the last."""
     beyond = np.minimum(at - x[0], 0.0) + np.maximum(at - x[-1], 0.0)
-    return np.asarray(np.interp(at, x, y) + slope * beyond)
+    return np.interp(at, x, y) + slope * beyond
 
 
 def drive_phase(

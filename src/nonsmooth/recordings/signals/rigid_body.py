@@ -58,7 +58,7 @@ def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLi
         If a quaternion is not of length 1 within 1 %: their order may be another, or they are no quaternions.
     """
     place, turned = np.asarray(position, float), _turns(orientation).as_matrix()
-    return np.asarray(place[:, 2, None] + turned[:, 2, :] @ np.asarray(corners, float).T)
+    return place[:, 2, None] + turned[:, 2, :] @ np.transpose(corners)
 
 
 def corner_restitution(
@@ -120,7 +120,7 @@ def corner_restitution(
     for k, *sides in single_contacts(t, flights, window, longest):
         before, after = (_Flight(t, place, turns, side, fall) for side in sides)
         begin, end = t[sides[0].stop - 1], t[sides[1].start]
-        corner = int(np.argmin(before.heights(0.5 * (begin + end), points)))
+        corner = np.argmin(before.heights(0.5 * (begin + end), points))
         grid = np.linspace(begin, end, 41)
         apart = np.array([before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid])
         when = first_zero(grid, apart)
@@ -129,7 +129,7 @@ def corner_restitution(
         moved = (when + half_sample, when - half_sample)
         late, early = (-after.velocity(s, point)[0] / before.velocity(s, point)[0] for s in moved)
         v0, e0 = before.velocity(when, point)
-        touching = int(np.count_nonzero(heights < heights[corner] + reach))
+        touching = np.count_nonzero(heights < heights[corner] + reach)
         same = corner == np.argmin(after.heights(when, points))
         rows.append(
             {

@@ -190,7 +190,7 @@ class _Nodes:
         )
         if self.known:
             return self.sums[0] + self.sums[1]
-        used = int(np.count_nonzero(np.isfinite(self.r)))
+        used = np.count_nonzero(np.isfinite(self.r))
         return used * math.log(self.sums[0] / (used - self.order)) + self.sums[1]
 
     def likeliest(self) -> FloatArray:
@@ -230,7 +230,7 @@ class _Nodes:
 
         n, cost = self.order, self.cost(q)
         smooth_nodes(n, self.step, np.where(self.inside, q[1], q[0]), self.u, self.P, self.work)
-        used = int(np.count_nonzero(np.isfinite(self.r)))
+        used = np.count_nonzero(np.isfinite(self.r))
         sigma = self.sigma if self.known else self.sigma * math.sqrt(self.sums[0] / (used - n))
         units = [self.h**-k for k in range(n)]
         states = self.u[1] * self.sigma * units

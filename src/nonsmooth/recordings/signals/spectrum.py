@@ -102,7 +102,7 @@ def spectrum(
     if rate is None:
         if not hasattr(x, "dims") or x.ndim != 1 or x.dims[0] not in x.coords:
             raise ValueError("rate is needed: the sample rate in Hz, or a DataArray with its time")
-        times = np.asarray(x[x.dims[0]], float)
+        times = x[x.dims[0]]
     elif not (math.isfinite(rate) and rate > 0):
         raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
     else:
@@ -178,15 +178,15 @@ def peak(
     if interpolation not in INTERPOLATIONS:
         raise ValueError(f"interpolation must be one of {', '.join(INTERPOLATIONS)}, got {interpolation!r}")
     frequency, amplitude = spectrum.frequency.values, spectrum.amplitude.values
-    padding = int(spectrum.attrs["padding"])
-    first = int(np.searchsorted(frequency, low)) if low is not None else min(2 * padding, len(frequency) - 1)
-    last = int(np.searchsorted(frequency, high, side="right")) if high is not None else len(frequency)
+    padding = spectrum.attrs["padding"]
+    first = np.searchsorted(frequency, low) if low is not None else min(2 * padding, len(frequency) - 1)
+    last = np.searchsorted(frequency, high, side="right") if high is not None else len(frequency)
     if last - first < 3:
         raise ValueError(
             f"the band {low} to {high} Hz holds {max(last - first, 0)} lines of this spectrum, {frequency[1]:.4g} Hz "
             "apart; at least 3 are needed: widen it, record longer, or pad"
         )
-    k = first + int(np.argmax(amplitude[first:last]))
+    k = int(first + np.argmax(amplitude[first:last]))
     if not 0 < k < len(frequency) - 1 or amplitude[k] < max(amplitude[k - 1], amplitude[k + 1]):
         raise ValueError(
             f"the largest line of the band stands at its edge, {frequency[k]:.4g} Hz: no peak inside; widen the band"
@@ -235,7 +235,7 @@ class _Shape:
 
         from scipy.signal import get_window
 
-        self.n, self.padding = int(spectrum.attrs["samples"]), int(spectrum.attrs["padding"])
+        self.n, self.padding = spectrum.attrs["samples"], spectrum.attrs["padding"]
         name = spectrum.attrs["window"]
         self.weights = get_window(ast.literal_eval(name) if name.startswith("(") else name, self.n)
         self.total = self.weights.sum()
@@ -329,7 +329,7 @@ class _Shape:
 def _noise(spectrum: xr.Dataset, k: int) -> float:
     """Variance per sample of white noise, from the median density between 4 and 40 independent lines from the peak."""
     density = spectrum.density.values[1:]
-    away = np.abs(np.arange(1, len(density) + 1) - k) / int(spectrum.attrs["padding"])
+    away = np.abs(np.arange(1, len(density) + 1) - k) / spectrum.attrs["padding"]
     beside = density[(away > 4) & (away < 40)]
     if len(beside) == 0:
         return math.nan

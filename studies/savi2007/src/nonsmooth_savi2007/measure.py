@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -98,16 +98,6 @@ def changes(swept: xr.Dataset, first: int, second: int, direction: str | None = 
     ]
 
 
-def highest(found: Sequence[Interval]) -> Interval | None:
-    """The last of intervals at rising values, if there is one."""
-    return found[-1] if found else None
-
-
-def lowest(found: Sequence[Interval]) -> Interval | None:
-    """The first of intervals at rising values, if there is one."""
-    return found[0] if found else None
-
-
 def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None) -> tuple[float, float] | None:
     """Smallest and largest parameter value with a regime; None where it does not occur."""
     values, regime = regimes(swept, direction)
@@ -155,7 +145,7 @@ def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[Fl
 def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
     """Number of starts of a ``survey`` (a sweep from several starts) that end in each regime at one parameter value."""
     regime = _regime(survey.sel({parameter_of(survey): value}, method="nearest"))
-    return {int(r): int((regime == r).sum()) for r in np.unique(regime)}
+    return {r: (regime == r).sum() for r in np.unique(regime)}
 
 
 def separation_rate(twins: xr.Dataset) -> tuple[float, float]:

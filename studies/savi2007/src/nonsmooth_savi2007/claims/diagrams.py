@@ -30,8 +30,6 @@ from nonsmooth_savi2007.measure import (
     UNSETTLED,
     Interval,
     changes,
-    highest,
-    lowest,
     motion_word,
     parameter_of,
     period_word,
@@ -54,19 +52,19 @@ def f11(data: Data) -> Iterator[Statement]:
         (4, "period 4 down to", "Longer periods follow below.", Cell("longer periods pass too quickly in a rise")),
     ):
         printed = NUMBERS[f"period {n} from"]
-        found = [highest(changes(one, n, 2 * n, "up")) for one in swept]
+        found = [max(changes(one, n, 2 * n, "up"), default=None) for one in swept]
         beyond = found[0] is not None and found[0].high < printed.value
         words = f"{late if beyond else ''} {why}".strip()
         yield against_printed(f"{says} {printed}", printed, found, words).measured(cell)
     edges = [_chaos_from(one) for one in swept]
     values, regime = regimes(swept[0], "up")
     inside = regime[values <= edges[0].high] if edges[0] is not None else regime[:0]
-    windows = sorted({int(n) for n in inside if n > 0})
+    windows = np.unique(inside[inside > 0])
     yield against_printed(
         f"chaos for rho of at most {printed}",
         printed,
         edges,
-        f"No period up to 16 at {int((inside == APERIODIC).sum())} of {len(inside)} values below; windows of "
+        f"No period up to 16 at {(inside == APERIODIC).sum()} of {len(inside)} values below; windows of "
         f"period {', '.join(map(str, windows)) or '(none)'} between.",
     ).measured(_below(rise, printed.value, str(printed)))
 
@@ -121,7 +119,7 @@ def _below(rise: xr.Dataset, end: float, words: str) -> Cell:
     if not len(numbers):
         return Cell(f"no turn below {words}")
     kinds, counts = np.unique(numbers, return_counts=True)
-    kind, share = int(kinds[counts.argmax()]), 100 * counts.max() / counts.sum()
+    kind, share = kinds[counts.argmax()], 100 * counts.max() / counts.sum()
     return Cell(f"{period_word(kind)} in {share:.0f} % of the turns below {words}", agreed(kind == APERIODIC))
 
 
@@ -235,7 +233,7 @@ def f17(data: Data) -> Iterator[Statement]:
             texts.append(f"{motion_word(kinds[-1])}, {contacts[-1]:.2f} contacts per period")
         right, swapped = _as_stated(says, kinds[0], contacts[0] > 0)
         difference = "another motion" if not right else "contact and no contact swapped" if swapped else "none"
-        near = runs.isel(run=int(np.abs(runs["value"].values - omega).argmin()))
+        near = runs.isel(run=np.abs(runs["value"].values - omega).argmin())
         number, touches = int(near["period_number"]), bool(near["contact"])
         text = f"{period_word(number)}, {'contact' if touches else 'no contact'} (at {float(near['value']):.3f} rad/s)"
         yield of_both(
@@ -273,7 +271,7 @@ def _without_support(swept: xr.Dataset, omega: float, swapped: bool) -> str:
 def _abrupt(data: Mapping[str, xr.Dataset]) -> Statement:
     texts = []
     for flow in FLOWS:
-        first = lowest(changes(data[flow], 1, 2, "up"))
+        first = min(changes(data[flow], 1, 2, "up"), default=None)
         rising, falling = (range_of(data[flow], APERIODIC, direction) for direction in ("up", "down"))
         if first is None or rising is None or falling is None:
             texts.append("not found")
@@ -316,7 +314,7 @@ def _transitions(runs: xr.Dataset) -> Cell:
 def f17_grazing(data: Data) -> Iterator[Statement]:
     """Falling frequency: motion without contact ends, in chaos, where it grazes."""
     both = [data["fig17"][flow] for flow in FLOWS]
-    met = [highest(changes(one, 1, APERIODIC, "down")) for one in both]
+    met = [max(changes(one, 1, APERIODIC, "down"), default=None) for one in both]
     yield against_grazing("the abrupt transition is grazing (falling)", both, -1, met).measured(
         Cell("not recorded with falling frequency")
     )
@@ -344,7 +342,7 @@ def attractors(data: Data, name: str) -> Iterator[Statement]:
     yield Statement(
         place,
         says,
-        f"attractors of {label.size} starts: {'; '.join(names)}; none reached by {int((label.values < 0).sum())}",
+        f"attractors of {label.size} starts: {'; '.join(names)}; none reached by {(label.values < 0).sum()}",
         "not asked: of the exact flow",
         "none" if alone else f"not alone: {others}",
         Verdict.DIFFERS if period not in periods else Verdict.AGREES if alone else Verdict.IN_PART,

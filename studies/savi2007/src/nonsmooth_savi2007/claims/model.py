@@ -77,8 +77,8 @@ def in_regions(data: Data, flow: str) -> Iterator[Statement]:
         )
         edges = [h_a - eta, h_a + eta, h_b - eta, h_b + eta] + [h_a + h_b] * (eta > 0)
         clear = (np.abs(edges) > ON_A_BORDER).all(axis=0)
-        right += int((region == orbit["mode"].values)[clear].sum())
-        total += int(clear.sum())
+        right += (region == orbit["mode"].values)[clear].sum()
+        total += clear.sum()
     place, says, regions, why = _REGIONS[flow]
     found = f"mode = {regions} at {right} of {total} samples"
     texts = (found, "see M3") if flow == "exact" else ("see M2", found)
@@ -111,7 +111,7 @@ def m4(data: Data) -> Iterator[Statement]:
         f"{max(FITTED[0], float(errors['eta'].min())):.0e} "
         f"and {FITTED[1]:.0e}",
         f"order {order.min():.3f} ... {order.max():.3f}",
-        agreed(bool((np.abs(order - 2) < 0.1).all())),
+        agreed((np.abs(order - 2) < 0.1).all()),
         "Away from grazing it matters little: a tenth of the band makes a hundredth of the error.",
     )
     yield Statement(
@@ -140,7 +140,7 @@ def c1(data: Data) -> Iterator[Statement]:
     for flow in FLOWS:
         both = [data[name][flow] for name in ("fig09", "fig10")]
         met = _jumps(both)
-        periods = sorted({int(n) for n in np.unique(regimes(data["fig11"][flow], "up")[1]) if n > 0})
+        periods = [n for n in np.unique(regimes(data["fig11"][flow], "up")[1]) if n > 0]
         rate, error = separation_rate(data["fig15"][f"{flow}_twins"])
         texts.append(
             f"{met} jumps in Figs. 9-10; periods {', '.join(map(str, periods))} in Fig. 11; neighbouring trajectories "
@@ -151,7 +151,7 @@ def c1(data: Data) -> Iterator[Statement]:
         at_grazing.append(sum(step is Verdict.AGREES for step in steps))
     runs = [data[name]["runs"] for name in ("fig09_rig", "fig10_rig")]
     count = _jumps(runs)
-    flips = int(np.isfinite(slowest(data["fig11_rig"])["measured_flip"].values).sum())
+    flips = np.isfinite(slowest(data["fig11_rig"])["measured_flip"].values).sum()
     chaos = int(data["fig16"]["attractor"]["measured_period_number"]) == APERIODIC
     cells = (grazing_cell(find(runs[i], way), (FIGURE_9, FIGURE_10)[i], at) for i, find, way, at in _AT_GRAZING)
     near = sum(cell.verdict is Verdict.AGREES for cell in cells)

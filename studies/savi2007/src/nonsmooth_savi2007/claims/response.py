@@ -27,7 +27,6 @@ from nonsmooth_savi2007.grazing import grazing_frequencies
 from nonsmooth_savi2007.measure import (
     Interval,
     changes,
-    lowest,
     main_jump,
     measured_periods,
     range_of,
@@ -203,7 +202,7 @@ def grazing_behind_both(data: Data) -> Iterator[Statement]:
         "form of Fig. 9's lower grazing",
         both,
         0,
-        [lowest(changes(one, 1, 2, "up")) for one in both],
+        [min(changes(one, 1, 2, "up"), default=None) for one in both],
         "The period-2 range of Fig. 9 begins where the motion without contact grazes, as does the small jump of "
         "Fig. 10.",
         place=_10,
@@ -272,7 +271,7 @@ def between_cell(runs: xr.Dataset) -> Cell:
 def no_doubled_cell(runs: xr.Dataset) -> Cell:
     """No range of period 2: a response has it where neighbouring runs of one direction do."""
     doubled = [measured_periods(runs, direction)[1] == 2 for direction in ("up", "down")]
-    count = sum(int(here.sum()) for here in doubled)
+    count = sum(here.sum() for here in doubled)
     ranges = any((here[1:] & here[:-1]).any() for here in doubled)
     text = f"{count} of {runs.sizes['run']} runs with period 2" + ("" if ranges or not count else ", no two neighbours")
     why = "" if ranges or not count else "Rig: a record of some eight turns can show a motion that is still settling."

@@ -253,7 +253,7 @@ def session_measurement(
     if shows == "response":
         # Steps that do not say how they were reached: up as long as the frequency rises.
         omega = [float(motion["omega"]) for motion in motions]
-        top = int(np.argmax(omega))
+        top = np.argmax(omega)
         words = [str(i.settings.get("direction", "up" if n <= top else "down")) for n, i in enumerate(chosen)]
         return measured_response(motions, words), settings
     settings["omega"] = (float(motions[0]["omega"]), float(motions[0]["omega_error"]))

@@ -102,7 +102,7 @@ def with_returns(system: System, branch: xr.Dataset) -> xr.Dataset:
             after = points.transpose("iterate", "state").values
         except SolveError:
             after = np.full((n, section.shape[1]), np.nan)
-        closed = bool((np.abs(after[-1] - section[i]) <= _CLOSED * size).all())
+        closed = (np.abs(after[-1] - section[i]) <= _CLOSED * size).all()
         returns[i, 1:] = after[:-1] if closed else np.nan
     return branch.assign(
         returns=(("point", "iterate", "state"), returns, {"long_name": "states at the section, all of the orbit"})

@@ -90,7 +90,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
 
 def _caption(data: Datasets) -> str:
     found = data["basins"]
-    lost = int((found["label"].values < 0).sum())
+    lost = (found["label"].values < 0).sum()
     at = ", ".join(
         f"{name} = {' '.join(prefixed(float(found[name]), found[name].attrs['units']))}"
         for name in ("omega", "rho", "g")

@@ -84,7 +84,7 @@ def draw_diagram(ax: Axes, data: Datasets, key: str, y: str, figure: str) -> Non
         (other & ~settled, "#D0D0D0", 1.4, "other starts, no period"),
         (other & settled, "#8C8C8C", 1.8, "other starts, periodic"),
     ):
-        if bool(chosen.any()):
+        if chosen.any():
             plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, color=color, size=size)
             ax.get_lines()[-1].set(label=name, zorder=0.3)
     lines = branches_to_draw(data) if key == EXACT.key else []
@@ -192,7 +192,7 @@ def _windows(data: Datasets) -> dict[int, tuple[float, float]]:
     found = {}
     for period in np.unique(periods.values[periods.values > 1]):
         at = above["omega"].values[(periods == period).any("start").values]
-        found[int(period)] = (at[0], at[-1])
+        found[period] = (at[0], at[-1])
     return found
 
 

@@ -69,7 +69,7 @@ def slowest(data: Datasets) -> xr.Dataset:
 def flip_of(rise: xr.Dataset, name: str, kind: str) -> float:
     """A number of the flip ``1-2`` or ``2-4`` of a rise; NaN where there is none."""
     at = np.flatnonzero(rise["flip"].values.astype(str) == name)
-    return rise[kind].values[at[0]] if len(at) else float("nan")
+    return rise[kind].values[at[0]] if len(at) else np.nan
 
 
 def flips_said(result: xr.Dataset, name: str) -> str:

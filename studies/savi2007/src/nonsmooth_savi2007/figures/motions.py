@@ -80,7 +80,7 @@ def runs_of(found: Motions, parameter: str) -> xr.Dataset:
         # where turning points lie: one outlier is no contact
         reach = np.quantile(motion["u"].sel(state="x").values, 0.999)
         error = np.median(motion["u_error"].sel(state="x").values)
-        touches.append(bool(reach > _value(settings, "g") + 3 * error))
+        touches.append(reach > _value(settings, "g") + 3 * error)
     nominal = [float(key.partition("_")[0]) for key in keys]
     runs = xr.Dataset(
         {
@@ -117,7 +117,7 @@ def said(data: Datasets, shown: Mapping[float, int], unit: str) -> str:
     words = []
     for value in shown:
         rig = period_words(measured_periods_at(data, value))
-        model = sorted({int(n) for run in runs_at(data, value) for n in run["coexisting_period_number"].values})
+        model = sorted({n for run in runs_at(data, value) for n in run["coexisting_period_number"].values})
         words.append(f"{' '.join(prefixed(value, unit))}: {rig} (model: {', '.join(period_word(n) for n in model)})")
     return "; ".join(words)
 

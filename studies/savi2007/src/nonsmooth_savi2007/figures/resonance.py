@@ -159,7 +159,7 @@ def _caption_rig(data: Datasets) -> str:
         f"{word}: {', '.join(map(str, jumps(runs, direction))) or 'none'} rad/s"
         for direction, word in (("up", "rising"), ("down", "falling"))
     ]
-    doubled = int(np.count_nonzero(measured_periods(runs)[1] == 2))
+    doubled = np.count_nonzero(measured_periods(runs)[1] == 2)
     differences = 100 * np.abs(compared["relative_difference"].values)
     return (
         f"Frequency steps on the virtual rig (synthetic), {runs.sizes['run']} runs with rising and falling frequency, "

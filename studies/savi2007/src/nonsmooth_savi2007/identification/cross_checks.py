@@ -69,7 +69,7 @@ def birge_ratio(chi2: float, freedom: int) -> tuple[float, bool]:
     """Root of chi^2 per degree of freedom, and whether chance explains it; NaN and True without any freedom."""
 
     if freedom < 1:
-        return float("nan"), True
+        return np.nan, True
     return np.sqrt(chi2 / freedom), bool(distribution.sf(chi2, freedom) >= CHANCE)
 
 

@@ -168,7 +168,7 @@ def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float)
     """
     q = np.exp(-np.pi * b / (2 * np.sqrt(omega_0**2 - b**2 / 4)))
     below = f / omega_0**2 * (1 + q) / (1 - q)
-    return np.maximum((first + below) * np.exp(-b * np.asarray(time) / 2) - below, 0.0)
+    return np.maximum((first + below) * np.exp(-b * time / 2) - below, 0.0)
 
 
 def decay_damping(decay: DecayFit, mass: Quantity) -> Finding:

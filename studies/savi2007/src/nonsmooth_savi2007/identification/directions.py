@@ -116,7 +116,7 @@ def _slope(run: Run) -> float:
     """Force over displacement (N/m) by least squares; 0 where the force does not follow the displacement."""
     if run.x is None or run.force is None or run.x.size != run.force.size or run.x.size < 3:
         return 0.0
-    x, force = run.positions, np.asarray(run.force.values, float)
+    x, force = run.positions, run.force.values
     x, force = x - x.mean(), force - force.mean()
     spread, common = x @ x, x @ force
     if abs(common) <= _FOLLOWS * np.sqrt(spread * (force @ force)):

@@ -55,12 +55,12 @@ class Run:
     @property
     def time(self) -> FloatArray:
         """Times of the position (s)."""
-        return np.asarray(self.x["time"].values, float)
+        return self.x["time"].values
 
     @property
     def positions(self) -> FloatArray:
         """Position (m), as counted."""
-        return np.asarray(self.x.values, float)
+        return self.x.values
 
     @property
     def passages(self) -> FloatArray:
@@ -211,6 +211,6 @@ def _run(
         found["force"] = take(recording, "Force", name, units=("N",))
     if has("Turn"):
         passages = take(recording, "Turn", name, samples=_PASSAGES)
-        found["turns"] = np.asarray(passages["time"].values, float)
-        found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, float)) < 0))
+        found["turns"] = passages["time"].values
+        found["backwards"] = np.all(np.diff(passages.values) < 0)
     return Run(procedure, name, dict(settings), abs(travel) / counts, synthetic=recording.synthetic, **found)

@@ -108,7 +108,7 @@ class DecayFit(NamedTuple):
     def fitted(self, which: int) -> FloatArray:
         """Fitted positions of one of the runs (m), in the sensor's count."""
         data = self.fit.residuals
-        return np.asarray(data["fitted"].values[data["run"].values == which], float)
+        return data["fitted"].values[data["run"].values == which]
 
     def begins(self, which: int) -> tuple[float, float]:
         """Position from rest (m) and velocity (m/s) of one of the runs at its first sample."""
@@ -132,12 +132,12 @@ def swing(run: Run, slowest: float = SLOWEST) -> tuple[int, int]:
         raise ValueError(f"the car moves by {np.max(np.abs(away)) / run.resolution:.0f} counts only: tap it harder")
     # before the tap it rests, or is held: the first turning point comes after it has begun to move
     _, tops = find_peaks(np.abs(away), height=0.5 * np.max(np.abs(away)), plateau_size=1)
-    begin = int(np.append(tops["right_edges"], moving)[0])
+    begin = np.append(tops["right_edges"], moving)[0]
     crossings = begin + 1 + np.flatnonzero(np.sign(away[begin + 1 :]) != np.sign(away[begin:-1]))
     at = crossings[(crossings >= begin + 2) & (crossings < len(x) - 2)]
     speeds = np.abs(x[at + 2] - x[at - 2]) / (time[at + 2] - time[at - 2])
-    fast = int(np.argmax(np.append(speeds < slowest, True)))
-    end = int(at[fast - 1]) + 1 if fast else begin
+    fast = np.argmax(np.append(speeds < slowest, True))
+    end = at[fast - 1] + 1 if fast else begin
     if fast < 2 or end - begin < 20:
         raise ValueError(
             f"only {fast} half swings are faster than {slowest:g} m/s; tap harder, or give a smaller `slowest`"
@@ -293,7 +293,7 @@ def _agreeing(
     for i, keep in zip(good, agreed.used, strict=True):
         if not keep:
             off = agreed.off(*told[i])
-            k = int(np.argmax(np.abs(off)))
+            k = np.argmax(np.abs(off))
             said.append(
                 f"{_named(parts[i].run)}: left out: its {_NAMES[used[k]]} is {off[k]:+.1f} combined uncertainties from "
                 f"that of the {np.count_nonzero(agreed.used)} runs that agree; see whether the string slipped on the "

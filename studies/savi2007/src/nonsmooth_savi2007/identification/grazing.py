@@ -170,7 +170,7 @@ def _touching(seen: Steady) -> tuple[int, float]:
         free = seen.mean[:begun]
         limit = max(_SIGMAS * free.std(ddof=1), _COUNTS * seen.resolution)
         near = np.flatnonzero(np.abs(seen.mean - np.mean(free)) <= limit)
-        before, begun = begun, max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
+        before, begun = begun, max(near[-1] + 1 if len(near) else 0, _FIRST)
         if begun == before:
             break
     else:
@@ -232,7 +232,7 @@ def _height(seen: Steady, free: NDArray[np.bool_], decay: DecayFit) -> Callable[
     near = rows[np.argsort(np.abs(seen.omega[rows] - seen.omega[rows[-1]]))[: max(_FIRST, len(rows) // 2)]]
     scale = np.mean(seen.amplitude[near] / model(seen.omega[near]))
     more = np.mean(seen.highest[near] - seen.mean[near] - seen.amplitude[near])
-    return lambda omega: scale * model(np.asarray(omega)) + more
+    return lambda omega: scale * model(omega) + more
 
 
 def _sensor_error(seen: Steady, free: NDArray[np.bool_], height: Callable[[FloatArray], FloatArray]) -> float:

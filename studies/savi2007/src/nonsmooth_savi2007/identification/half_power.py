@@ -61,7 +61,7 @@ def half_power_points(omega: FloatArray, amplitude: FloatArray) -> tuple[float, 
     )
     q = np.linspace((squares.min() - middle) / width, (squares.max() - middle) / width, 2001)
     height = cubic(q)
-    top = int(np.argmin(height))
+    top = np.argmin(height)
     over = np.flatnonzero(np.diff(np.sign(height - 2 * height[top])))
     if len(over) != 2 or not over[0] < top < over[1]:
         raise ValueError("the runs do not enclose both half-power frequencies: step over a wider range")

@@ -194,7 +194,7 @@ def receptance(
         Of the drive, and the crank's angle at the photogate (rad).
     """
     w = np.asarray(omega, float)
-    size = grazing_amplitude(w, scale * np.asarray(crank_length, float), omega_0, b, f)
+    size = grazing_amplitude(w, scale * crank_length, omega_0, b, f)
     # in phase with -x the springs and the inertia, in phase with -v the losses
     lag = np.arctan2(b * w * size + 4 * f / np.pi, (omega_0**2 - w**2) * size)
     return size * np.exp(1j * (mark - lag))

@@ -95,7 +95,7 @@ class Steady:
 
 def harmonics_of(run: Run, values: Any) -> tuple[HarmonicFit, float, float]:
     """Harmonics of a channel of a run over whole turns; the drive's frequency, and the time of phase 0."""
-    time = np.asarray(values["time"].values, float)
+    time = values["time"].values
     drive = drive_phase(run.passages)
     whole = int(np.floor((time[-1] - time[0]) / drive.period))
     if whole < 2:

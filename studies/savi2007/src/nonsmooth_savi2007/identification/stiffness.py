@@ -137,14 +137,14 @@ def _linear_law(
 
 
 def _columns(run: Run, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
-    time, force_time = run.time, np.asarray(run.force["time"].values, float)
+    time, force_time = run.time, run.force["time"].values
     if len(time) != len(force_time) or np.max(np.abs(time - force_time)) > 1e-6:
         raise ValueError(
             f"{run.label}: channels 'Angle' and 'Force' are not over the same times; record both at one rate"
         )
     smooth = savitzky_golay(time, run.x, resolution=run.resolution, window=_WINDOW, order=_ORDER)
     v, a = smooth["v"].values, smooth["a"].values
-    force = np.asarray(run.force.values, float) - mass * a
+    force = run.force.values - mass * a
     parts = [run.positions, v]
     inside = np.ones(len(time), bool)
     if friction:

@@ -53,7 +53,7 @@ def _points(figure: str, branch: xr.Dataset) -> list[SpecialPoint]:
         kind, value, at = str(row["kind"].values), float(row[parameter]), int(row["point"])
         contact = closed = None
         if kind == "grazing":
-            contact = _largest(row["contact_multipliers"].values) if bool(row["bounded"]) else None
+            contact = _largest(row["contact_multipliers"].values) if row["bounded"] else None
             free = contacts[max(at - 1, 0) : at + 2].min() == 0  # on one side there is no contact at all
             if free and parameter == "omega" and int(branch["period_number"]) == 1:
                 closed = min(grazing_of(branch), key=lambda omega: abs(omega - value))

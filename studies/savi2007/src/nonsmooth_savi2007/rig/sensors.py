@@ -68,7 +68,7 @@ def force(rig: VirtualRig, rng: np.random.Generator, run: str, time: FloatArray,
     reading = rig.truth["force_sign"] * reading
     if rig.quantisation:
         reading = FORCE_STEP * np.rint(reading / FORCE_STEP)
-    beyond = int(np.count_nonzero(np.abs(reading) > FORCE_RANGE))
+    beyond = np.count_nonzero(np.abs(reading) > FORCE_RANGE)
     if beyond:
         warnings.warn(
             f"run {run!r}, channel 'Force': {beyond} of {len(reading)} samples saturate at {FORCE_RANGE:.0f} N; "
@@ -88,7 +88,7 @@ def turns(rig: VirtualRig, crossed: FloatArray) -> xr.Dataset:
 
 def _sensor(time: FloatArray, name: str, unit: str, values: FloatArray) -> xr.Dataset:
     attrs = {"long_name": name, "measurement": name, "units": unit}
-    rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else float("nan")
+    rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else np.nan
     sampling = "irregular" if name == "Turn" else "regular"
     coordinate = ("time", time, {"long_name": "time", "units": "s"})
     return xr.Dataset({name: ("time", values, attrs)}, {"time": coordinate}, {"rate": rate, "sampling": sampling})
