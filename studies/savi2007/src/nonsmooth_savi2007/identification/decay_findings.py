@@ -37,6 +37,7 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from scipy.optimize import minimize_scalar
 from scipy.signal import zoom_fft
 
 from nonsmooth import SolveError
@@ -69,12 +70,9 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
     With :math:`S = |X|^2` the peak errs by :math:`\sqrt 2\, |X| \sigma_{X'} / |S''|`, where the noise of :math:`X'` is
     :math:`2\pi\sigma` times the root of :math:`\sum (t - \bar t)^2`, :math:`\bar t` the delay of the peak.
     """
-    low, high = about - step, about + step
-    for _ in range(3):
-        f, magnitude = _between(time, x, low, high)
-        top = np.clip(np.argmax(magnitude), 1, FINE - 2)
-        low, high = f[top - 1], f[top + 1]
-    at = 0.5 * (low + high)
+    at = minimize_scalar(
+        lambda f: -abs(np.exp(-2j * np.pi * f * time) @ x), bounds=(about - step, about + step), options={"xatol": 1e-9}
+    ).x
     wave = np.exp(-2j * np.pi * at * time)
     value, first, second = (np.sum((-2j * np.pi * time) ** n * x * wave) for n in range(3))
     bend = 2 * ((np.conj(value) * second).real + abs(first) ** 2)
@@ -85,7 +83,6 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
 
 def _between(time: FloatArray, x: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
     """Frequencies between two (Hz), and the modulus of the sum of the samples there."""
-
     lines = zoom_fft(x, [low, high], m=FINE, fs=(len(time) - 1) / (time[-1] - time[0]), endpoint=True)
     return np.linspace(low, high, FINE), np.abs(lines)
 
