@@ -45,7 +45,7 @@ class Residuals:
     def chi2(self, weights: list[FloatArray], used: Any = None) -> float:
         """Sum of the weighted residuals' squares, of all pieces or of those that are used."""
         rows = zip(self.residuals, weights, strict=True)
-        each = (float(np.sum((r * w) ** 2)) for i, (r, w) in enumerate(rows) if used is None or used[i])
+        each = (np.sum((r * w) ** 2) for i, (r, w) in enumerate(rows) if used is None or used[i])
         return sum(each, float(self.alone @ self.alone))
 
 
@@ -181,7 +181,7 @@ def settle(
             # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
             if damping > (1e4 if rough else 1e8):
                 distance, rest = undamped()
-                if (far := float(np.max(distance))) < _ACCURACY or rough:
+                if (far := np.max(distance)) < _ACCURACY or rough:
                     return theta, starts, state
                 raise unsettled(
                     f": no step lowers the sum of squares, though its minimum should be {far:.2g} standard "
@@ -191,7 +191,7 @@ def settle(
         state = problem.residuals(theta, starts, True)
         # by the undamped step: a damped one is short wherever it is taken
         distance, rest = undamped()
-        far = float(np.max(distance))
+        far = np.max(distance)
         if far < _SETTLED or (far < _ACCURACY and gain < 1e-7 * best) or (rough and gain < _LITTLE * best):
             return theta, starts, state
         damping = max(damping / 10, 1e-9)
@@ -237,4 +237,4 @@ def sandwich(problem: Windows, theta: FloatArray, starts: FloatArray) -> Sandwic
     covariance = not_below(
         inverse @ (meat * part + alone + prior) @ inverse, inverse @ (normal * size + prior) @ inverse
     )
-    return Sandwich(state, covariance, size, float(np.median(tau)), normal, back)
+    return Sandwich(state, covariance, size, np.median(tau), normal, back)

@@ -97,7 +97,7 @@ def _best_drawn(problem: Windows, rng: np.random.Generator) -> list[tuple[FloatA
             for j in range(_STARTS):
                 z = np.where(known, told, window.start) + (size * rng.standard_normal(len(size)) if k or j else 0.0)
                 one = problem.of([replace(window, start=z)])
-                cost = float(Stage(one, theta, z[None, :]).misfits[0])
+                cost = Stage(one, theta, z[None, :]).misfits[0]
                 if not cost >= least:
                     least, starts[i] = cost, z
             total += least

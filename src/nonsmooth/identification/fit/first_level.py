@@ -52,7 +52,7 @@ class Stage:
     def misfits(self) -> FloatArray:
         """Mean squared residual over the noise, of each window."""
         noise = self.problem.noise
-        return np.array([float(np.mean((r / noise[w.readings[1]]) ** 2)) for w, r in self.problem.rows(self.state)])
+        return np.array([np.mean((r / noise[w.readings[1]]) ** 2) for w, r in self.problem.rows(self.state)])
 
     def with_others(self, others: Mapping[int, tuple[Window, FloatArray]]) -> Stage:
         """The same with other windows and starts in these places; itself where there are none."""
@@ -94,7 +94,7 @@ def alone(stage: Stage, trials: list[tuple[Window, FloatArray]], most: int) -> l
             one = level(Stage(fixed.of([replace(window, start=start)]), theta, start[None, :]))
         except SolveError:
             continue
-        found.append((float(one.misfits[0]), one.problem.pieces[0], one.starts[0]))
+        found.append((one.misfits[0], one.problem.pieces[0], one.starts[0]))
     return sorted(found, key=lambda row: row[0])
 
 
@@ -210,7 +210,7 @@ def _sizes(stage: Stage) -> FloatArray:
     found = np.zeros(len(stage.problem.sensors))
     for c in range(len(found)):
         rows = [r[w.readings[1] == c] for w, r in stage.problem.rows(stage.state)]
-        each = [float(np.mean(r**2)) for r in rows if len(r)]
+        each = [np.mean(r**2) for r in rows if len(r)]
         found[c] = _PART * np.sqrt(np.median(each or [0.0]))
     return found
 
@@ -277,7 +277,7 @@ def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, l
         mine = np.flatnonzero(of_window == i)
         for first, behind in runs_of(_closed(bad[mine])):
             begin, end = now.pieces[mine[first]].time[0], now.pieces[mine[behind - 1]].time[-1]
-            worst = float(np.sqrt(np.max(each[mine[first:behind]]) / usual))
+            worst = np.sqrt(np.max(each[mine[first:behind]]) / usual)
             said.append(
                 f"left out: run {record.name}, {begin:.6g} to {end:.6g}, whose residuals are up to {worst:.3g} times "
                 "those of the rest"

@@ -29,7 +29,7 @@ def first_length(problem: Windows) -> float:
         columns = [y[np.isfinite(y)] for y in record.values.T]
         swing = 2.0 * record.duration / max(min(turns_of(y) for y in columns if len(y)), 4)
         found.append(max(_OF_A_SWING * swing, least * record.duration / (len(record.time) - 1)))
-    return float(np.median(found))
+    return np.median(found)
 
 
 def turns_of(y: FloatArray) -> int:
@@ -56,10 +56,10 @@ def first_windows(
     found: list[Window] = []
     for i, record in enumerate(problem.records):
         here, u = problem.at(theta, i), problem.unknowns
-        early = float(max(here.delays.max(), 0.0))  # a window begins by the longest delay before its first sample
+        early = max(here.delays.max(), 0.0)  # a window begins by the longest delay before its first sample
         for k, (_, what) in zip(u.places[i][len(u.active) :], u.sensors, strict=False):
             if what == "delay":
-                most, step = float(u.high[k]), float(np.median(np.diff(record.time)))
+                most, step = u.high[k], np.median(np.diff(record.time))
                 early = max(early, most if np.isfinite(most) else early + 10 * step)
         told = states_from_samples(problem, theta, i, slice(None))
         z = np.concatenate([np.zeros(n_u) if start is None else start[i], memory])

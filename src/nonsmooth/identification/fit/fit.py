@@ -207,7 +207,7 @@ def problem_of(
     ]
 
     def noise(readings: list[FloatArray], moving: bool = False) -> float:
-        return float(np.sqrt(np.mean([irregularity(y, moving) ** 2 for y in readings])))
+        return np.sqrt(np.mean([irregularity(y, moving) ** 2 for y in readings]))
 
     irregular = np.array(  # of a channel without noise that is mostly zero, as a contact's force, what moves
         [
@@ -319,7 +319,7 @@ def _guesses(
         residuals, weights = windows.residuals(guess, windows.starts).residuals, windows.weights(None)
         for w, r, weight in zip(windows.pieces, residuals, weights, strict=True):
             if np.isfinite(r).all():
-                total[w.record] += float(np.sum((r * weight) ** 2))
+                total[w.record] += np.sum((r * weight) ** 2)
                 count[w.record] += len(r)
         return np.where(count > 0, total / np.maximum(count, 1), np.inf)
 
@@ -340,7 +340,7 @@ def _guesses(
     def others() -> Iterator[tuple[FloatArray, float, FloatArray | None]]:
         yield given, _LONGER, start
         guesses = [with_phases(drawn(problem, rng)) for _ in range(_MORE * max(tries - 2, 1))]
-        order = np.argsort([float(np.sum(far(guess))) for guess in guesses], kind="stable")
+        order = np.argsort([np.sum(far(guess)) for guess in guesses], kind="stable")
         yield from ((guesses[i], _LONGER if k % 2 else 1.0, start) for k, i in enumerate(order))
 
     yield given, 1.0, start

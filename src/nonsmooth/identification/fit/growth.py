@@ -177,7 +177,7 @@ def _spreads(stage: Stage) -> float:
     for window, slopes in zip(stage.problem.pieces, stage.state.in_start, strict=True):
         rows = np.abs(slopes[: len(window.readings[0])]) * sizes
         for c in np.unique(window.readings[1]):
-            size = float(np.ptp(window.values[np.isfinite(window.values[:, c]), c])) or 1.0
+            size = np.ptp(window.values[np.isfinite(window.values[:, c]), c]) or 1.0
             found = max(found, np.max(rows[window.readings[1] == c]) / size)
     return found
 
@@ -228,14 +228,14 @@ def _final(stage: Stage, irregular: FloatArray, rounds: int) -> Grown:
         )
         ratios = [one.noise / old.noise for one, old in zip(steady, before.steady, strict=True)]
         moves = [np.concatenate([noise / before.noise, *ratios]) - 1.0, colour - before.colour]
-        changed = float(np.max(np.abs(np.concatenate(moves)), initial=0.0))
+        changed = np.max(np.abs(np.concatenate(moves)), initial=0.0)
         problem = replace(problem, noise=noise, steady=steady)
         try:
             theta, starts, _ = settle(problem, theta, starts)
             short, left = 0.0, np.zeros(len(theta))
         except Unsettled as reason:  # a sum of squares with corners: grazes, rest
             theta, starts = reason.values, reason.starts
-            short, left = float(np.max(reason.distance)), reason.step
+            short, left = np.max(reason.distance), reason.step
         if changed < 0.02:
             break
     state = problem.residuals(theta, starts)
@@ -284,8 +284,8 @@ def _noise(problem: Windows, state: Residuals) -> FloatArray:
         if sensor.noise is not None:
             found[c] = np.hypot(sensor.noise, sensor.floor)
         else:
-            size = robust_size(r) if np.isfinite(problem.loss) else float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
+            size = robust_size(r) if np.isfinite(problem.loss) else np.sqrt(np.mean(r**2)) if len(r) else 0.0
             values = [record.values[:, c] for record in problem.records]
-            largest = max((float(np.nanmax(np.abs(y), initial=0.0)) for y in values), default=0.0)
+            largest = max((np.nanmax(np.abs(y), initial=0.0) for y in values), default=0.0)
             found[c] = max(size * np.sqrt(grow), 0.5 * sensor.floor, ROUNDING * largest, 1e-300)
     return found

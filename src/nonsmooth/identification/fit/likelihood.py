@@ -28,7 +28,7 @@ def limits_of(values: FloatArray, rise: FloatArray, best: float, *, level: float
     """
     from scipy.stats import chi2
 
-    beyond, middle = rise - float(chi2.ppf(level, 1)), int(np.argmin(np.abs(values - best)))
+    beyond, middle = rise - chi2.ppf(level, 1), int(np.argmin(np.abs(values - best)))
     return first_zero(values[middle::-1], beyond[middle::-1]), first_zero(values[middle:], beyond[middle:])
 
 
@@ -56,9 +56,9 @@ def profiled(
             error = float(np.sqrt(covariance[i, i]))
             above: list[tuple[float, float]] = []
             for sign in (-1.0, 1.0):
-                above += _side(grown, i, sign * error, float(white[i] / covariance[i, i]))
+                above += _side(grown, i, sign * error, white[i] / covariance[i, i])
                 advance()
-            values, rise = np.array(sorted([*above, (float(grown.theta[i]), 0.0)])).T
+            values, rise = np.array(sorted([*above, (grown.theta[i], 0.0)])).T
             best = values[np.argmin(rise)]  # a better fit than the best, where the sum of squares has corners
             rise = rise - rise.min()
             estimate = Estimate(grown.theta[i], error, u.units[i])
@@ -96,7 +96,7 @@ def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, 
         rise = (problem.cost(theta, starts) - least) * scale
         if not np.isfinite(rise):
             break
-        rows.append((float(value), rise))
+        rows.append((value, rise))
         if rise > _HIGH:
             break
     return rows
@@ -152,7 +152,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
             advance()
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        tau = float(np.max(sampler.get_autocorr_time(tol=0)))
+        tau = np.max(sampler.get_autocorr_time(tol=0))
     thin = max(1, int(tau / 5)) if np.isfinite(tau) else 1
     draws = sampler.get_chain(discard=int(_BURNT * steps), thin=thin, flat=True)[:, :p]
     rows = {

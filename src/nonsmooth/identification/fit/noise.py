@@ -24,7 +24,7 @@ _LARGE = 1.5  # residuals over the record's own irregularity
 
 def robust_size(r: FloatArray) -> float:
     """Standard deviation of normal residuals, by their median size."""
-    return float(1.4826 * np.median(np.abs(r))) if len(r) else 0.0
+    return 1.4826 * np.median(np.abs(r)) if len(r) else 0.0
 
 
 def colours(problem: Windows, state: Residuals) -> FloatArray:
@@ -47,10 +47,10 @@ def _colour(problem: Windows, c: int, rows: list[tuple[FloatArray, FloatArray]])
     def unlikely(rho: float) -> float:
         """Minus twice the logarithm of the likelihood."""
         left = 1.0 - rho ** (2.0 * gaps)
-        return float(np.sum(np.log(left) + (here - rho**gaps * before) ** 2 / (power * left)))
+        return np.sum(np.log(left) + (here - rho**gaps * before) ** 2 / (power * left))
 
     best = minimize_scalar(unlikely, bounds=(0.0, _MOST), method="bounded")
-    return float(best.x) if best.x > _LEAST and unlikely(0.0) - best.fun > _SURE**2 else 0.0
+    return best.x if best.x > _LEAST and unlikely(0.0) - best.fun > _SURE**2 else 0.0
 
 
 def strange(problem: Windows, plain: Residuals, white: Residuals, irregular: FloatArray) -> tuple[float, bool]:

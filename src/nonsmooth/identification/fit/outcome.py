@@ -67,8 +67,8 @@ def outcome(
     for i in {*loose, *lost.tolist()}:
         covariance[i] = covariance[:, i] = 0.0
         covariance[i, i] = np.inf
-    told = {name: (float(v), unit) for name, v, unit in zip(u.names, theta, u.units, strict=True)} | starts
-    rows = [Estimate(v, float(np.sqrt(covariance[i, i])), unit) for i, (v, unit) in enumerate(told.values())]
+    told = {name: (v, unit) for name, v, unit in zip(u.names, theta, u.units, strict=True)} | starts
+    rows = [Estimate(v, np.sqrt(covariance[i, i]), unit) for i, (v, unit) in enumerate(told.values())]
     found_of = list(zip(told, rows, strict=True))
     a = sum(name in u.active for name in u.names)
     estimates, extra = dict(found_of[:a]), {**dict(found_of[a:]), **noise}
@@ -119,7 +119,7 @@ def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]]
         follows = np.zeros((len(window.start), len(grown.theta)))
         follows[:, window.which] = -inverse @ cross
         label = f", {problem.records[window.record].name}" if len(problem.records) > 1 else ""
-        starts |= {f"{states[k][0]}(0){label}": (float(grown.starts[i][k]), states[k][1]) for k in window.free}
+        starts |= {f"{states[k][0]}(0){label}": (grown.starts[i][k], states[k][1]) for k in window.free}
         rows.append(follows[window.free])
         own.append((inverse @ inverse.T)[np.ix_(window.free, window.free)] * found.reduced)
     return starts, rows, block_diag(*own)
@@ -133,9 +133,9 @@ def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:
     for c, (name, sensor) in enumerate(problem.sensors.items()):
         n = sum(int(np.sum(window.readings[1] == c)) for window in problem.pieces)
         if sensor.noise is None and n:
-            size = float(problem.noise[c])
+            size = problem.noise[c]
             unit = units[name] if sensor.gain == 1 else ""
-            rows[f"{name}.noise"] = Estimate(size, size * float(np.sqrt(found.correlation / (2.0 * n))), unit)
+            rows[f"{name}.noise"] = Estimate(size, size * np.sqrt(found.correlation / (2.0 * n)), unit)
     return rows
 
 
@@ -201,7 +201,7 @@ def _far_off(grown: Grown) -> list[str]:
             (one.error, known, _POOR, "their errors"),
             (np.full(len(left), np.std(one.measured)), ~known, _NOTHING, "their own variation"),
         ):
-            if mine.any() and (rms := float(np.sqrt(np.mean((left / size)[mine] ** 2)))) > most:
+            if mine.any() and (rms := np.sqrt(np.mean((left / size)[mine] ** 2))) > most:
                 found.append(
                     f"the readings of run {one.name} are {rms:.3g} times {words} away from the steady states of the "
                     "model: it does not describe them (are they in its units?), and the uncertainties do not hold"
@@ -249,7 +249,7 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
 
 
 def _length(grown: Grown) -> float:
-    return float(np.median([window.time[-1] - window.time[0] for window in grown.problem.pieces]))
+    return np.median([window.time[-1] - window.time[0] for window in grown.problem.pieces])
 
 
 def _of_readings(grown: Grown, c: int, data: xr.Dataset) -> list[str]:

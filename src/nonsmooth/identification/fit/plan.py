@@ -198,10 +198,10 @@ def _uncertainties(information: FloatArray) -> FloatArray:
 def _log_det(information: FloatArray, size: FloatArray) -> float:
     if not np.isfinite(_uncertainties(information)).all():
         return -np.inf
-    return float(np.linalg.slogdet(information * np.outer(size, size))[1])
+    return np.linalg.slogdet(information * np.outer(size, size))[1]
 
 
 def _gain(information: FloatArray, size: FloatArray) -> float:
     """The determinant with a little known of every direction, so that runs can be compared that leave one open."""
     scaled = information * np.outer(size, size)
-    return float(np.linalg.slogdet(scaled + 1e-9 * max(np.trace(scaled), 1e-300) * np.eye(len(size)))[1])
+    return np.linalg.slogdet(scaled + 1e-9 * max(np.trace(scaled), 1e-300) * np.eye(len(size)))[1]

@@ -49,7 +49,7 @@ class Record:
 
     @property
     def duration(self) -> float:
-        return float(self.time[-1] - self.time[0])
+        return self.time[-1] - self.time[0]
 
 
 def irregularity(y: FloatArray, moving: bool = False) -> float:
@@ -57,7 +57,7 @@ def irregularity(y: FloatArray, moving: bool = False) -> float:
     zero); a motion adds to it."""
     third = np.diff(y[np.isfinite(y)], 3)
     third = third[third != 0.0] if moving else third
-    return float(np.sqrt(np.median(third**2) / (20.0 * 0.4549))) if len(third) else 0.0
+    return np.sqrt(np.median(third**2) / (20.0 * 0.4549)) if len(third) else 0.0
 
 
 def read_records(

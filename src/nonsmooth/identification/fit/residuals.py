@@ -128,7 +128,7 @@ def by_place(data: xr.Dataset) -> list[tuple[str, float, int]]:
     """Places of the motion with the rms of the normalized residuals there and their number, the worst first."""
     names = data["place"].attrs["flag_meanings"].split()
     r, place = data["residual"].values, data["place"].values
-    rows = [(names[i], float(np.sqrt(np.mean(r[place == i] ** 2))), int(np.sum(place == i))) for i in np.unique(place)]
+    rows = [(names[i], np.sqrt(np.mean(r[place == i] ** 2)), int(np.sum(place == i))) for i in np.unique(place)]
     return sorted(rows, key=lambda row: -row[1])
 
 

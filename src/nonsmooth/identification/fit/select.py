@@ -138,7 +138,7 @@ def _error(problem: Windows, held: list[BoolArray], tries: int, seed: int) -> fl
     else:
         _predict(problem, grown, far)
     rows = [part[out][np.isfinite(part[out])] for part, out in zip(far, held, strict=True)]
-    return float(np.mean(np.concatenate(rows) ** 2))
+    return np.mean(np.concatenate(rows) ** 2)
 
 
 def _predict(problem: Windows, grown: Grown, far: list[FloatArray]) -> None:

@@ -232,7 +232,7 @@ def predicted(
             raw = raw[:, columns]
             for shift in range(max(ahead, 1)):
                 y = raw[shift : shift + shape[0]]
-                far = float(np.sum(((one.measured[mine] - (gain * y + offset).ravel()) / one.noise[mine]) ** 2))
+                far = np.sum(((one.measured[mine] - (gain * y + offset).ravel()) / one.noise[mine]) ** 2)
                 if far < least:
                     least, chosen = far, (job, shift, y)
         if chosen is None:
@@ -323,7 +323,7 @@ def _extreme(motion: SampledMotion, k: int, sign: float) -> float:
     y, t = sign * motion.z[:, k], motion.time
     i = 1 + np.argmax(y[1:-1])
     if motion.segment[i - 1] != motion.segment[i + 1]:
-        return float(t[i])
+        return t[i]
     one, other = np.diff(t[i - 1 : i + 2])
     down, up = np.diff(y[i - 1 : i + 2]) / (one, other)
-    return float(t[i] + 0.5 * (down * other + up * one) / (down - up)) if down > up else float(t[i])
+    return t[i] + 0.5 * (down * other + up * one) / (down - up) if down > up else t[i]
