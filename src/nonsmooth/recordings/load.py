@@ -190,8 +190,7 @@ def _detect(data: bytes, reading: Reading) -> str:
         )
     from nonsmooth.recordings.readers.capstone_csv import looks_like_capstone
 
-    plain = reading.columns is not None or reading.rate is not None or reading.axis != "time"
-    return "csv" if plain or not looks_like_capstone(data, replace(reading)) else "capstone-csv"
+    return "csv" if reading.says_axes or not looks_like_capstone(data, replace(reading)) else "capstone-csv"
 
 
 def _replace_units(reading: Reading) -> None:

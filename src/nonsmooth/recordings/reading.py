@@ -188,6 +188,11 @@ class Reading(Options, Remarks):
     synthetic: bool = False
 
     @property
+    def says_axes(self) -> bool:
+        """Whether options say what a Capstone file says itself."""
+        return self.columns is not None or self.rate is not None or self.axis != "time"
+
+    @property
     def asked(self) -> dict[str, Any]:
         """The options that differ from their defaults."""
         return {one.name: said for one in fields(Options) if (said := getattr(self, one.name)) != one.default}

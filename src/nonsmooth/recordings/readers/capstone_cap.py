@@ -34,7 +34,7 @@ _TYPED_TEXT = 2
 
 def read(data: bytes, reading: Reading) -> None:
     """Read a Capstone experiment."""
-    if reading.columns is not None or reading.rate is not None or reading.axis != "time":
+    if reading.says_axes:
         raise ValueError("columns, rate and axis do not concern a Capstone file, which says them itself")
     archive = Archive(data, reading)
     if "main.xml" not in archive.names:

@@ -46,7 +46,7 @@ def looks_like_capstone(data: bytes, reading: Reading) -> bool:
 
 def read(data: bytes, reading: Reading) -> None:
     """Read a Capstone CSV export."""
-    if reading.columns is not None or reading.rate is not None or reading.axis != "time":
+    if reading.says_axes:
         raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
     delimiter = reading.delimiter or _delimiter(data, reading)
     numerals = Numerals.of(delimiter, reading)

@@ -155,8 +155,7 @@ class _Chain:
 
     def __init__(self, evidence: Evidence) -> None:
         self.evidence, self.runs = evidence, evidence.runs
-        self.mass, limit = evidence.quantity("mass"), evidence.apparatus.get("force_gain_limit")
-        self.gain_limit = 0.01 if limit is None else limit.value
+        self.mass, self.gain_limit = evidence.quantity("mass"), evidence.apparatus["force_gain_limit"].value
         self.findings: list[Finding] = []
         self.observations = [self.weighed("mass")]
         self.notes: list[str] = []
@@ -192,25 +191,22 @@ class _Chain:
         self.findings.append(found)
         return found
 
-    def say(self, *sentences: str) -> None:
-        self.notes += sentences
-        for sentence in sentences:
-            warnings.warn(sentence, RecordingWarning, stacklevel=5)
-
-    def doubt(self, *sentences: str) -> None:
-        """Say what contradicts itself: a parameter may be wrong by more than its uncertainty."""
-        self.anomalies += sentences
+    def say(self, *sentences: str, doubts: bool = False) -> None:
+        """Say what a reader should know; ``doubts``: a parameter may be wrong by more than its uncertainty."""
+        kept = self.anomalies if doubts else self.notes
+        kept += sentences
         for sentence in sentences:
             warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
     def doubts(self, adjusted: Adjusted) -> None:
         """Anomalies: impossible values, disagreements, and procedures of which most runs could not be used."""
         self.unused()
-        self.doubt(*filter(None, [disagreement(adjusted), *impossible(adjusted)]))
+        self.say(*filter(None, [disagreement(adjusted), *impossible(adjusted)]), doubts=True)
         if self.contacts is not None and self.contacts.poor:
-            self.doubt(
+            self.say(
                 f"contact: the motion is not that of the model: residuals {self.contacts.excess:.3g} times the "
-                "sensor's noise. Look at the crank's length, the photogate and the gap of these runs"
+                "sensor's noise. Look at the crank's length, the photogate and the gap of these runs",
+                doubts=True,
             )
 
     def unused(self) -> None:
@@ -223,7 +219,7 @@ class _Chain:
                 continue
             sentence = f"{procedure}: {len(idle)} of {len(given)} runs were not used: {', '.join(idle)}"
             if 2 * len(idle) > len(given):
-                self.doubt(sentence)
+                self.say(sentence, doubts=True)
             elif any(not any(procedure in note and repr(name) in note for note in self.notes) for name in idle):
                 self.say(sentence)
 
@@ -359,4 +355,4 @@ class _Chain:
         )
         agree, disagree = sentences(found)
         self.notes += agree
-        self.doubt(*disagree)
+        self.say(*disagree, doubts=True)

@@ -162,7 +162,7 @@ def gather(
         )
     for name, value in (apparatus or {}).items():
         known[name] = value if isinstance(value, Quantity) else Quantity(*np.atleast_1d(value).tolist())
-    for name, default in (("counts_per_turn", 1440.0), ("turn_resolution", 1e-4)):
+    for name, default in (("counts_per_turn", 1440.0), ("turn_resolution", 1e-4), ("force_gain_limit", 0.01)):
         known.setdefault(name, Quantity(default))
     if "distance_per_turn" not in known:
         raise ValueError("the apparatus must state `distance_per_turn` (m): the car's travel per turn of the wheel")
