@@ -189,7 +189,7 @@ class Reading(Options, Remarks):
 
     @property
     def says_axes(self) -> bool:
-        """Whether options say what a Capstone file says itself."""
+        """Return whether options say what a Capstone file says itself."""
         return self.columns is not None or self.rate is not None or self.axis != "time"
 
     @property

@@ -121,7 +121,7 @@ def test_jumps_are_paired_within_their_direction() -> None:
     np.testing.assert_array_equal(seen, [2.72, 5.68, 5.15, np.nan])
     np.testing.assert_array_equal(expected, [np.nan, 5.66, 5.16, 2.0])
     assert found["jump_difference"][1][1] == pytest.approx(-0.02)
-    assert found["jump_tolerance"][1][1] == pytest.approx(0.021)
+    assert found["jump_tolerance"][1][1] == pytest.approx(0.0105)
     assert (found["theory_jump_low"][1][1], found["theory_jump_high"][1][1]) == pytest.approx((5.61, 5.69))
     assert np.isnan(found["theory_jump_low"][1][2])  # no draw has a falling jump
 

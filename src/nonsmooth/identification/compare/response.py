@@ -23,10 +23,10 @@ CERTAIN = 6.0  # and its standard error by this factor
 
 
 class AmplitudeJump(NamedTuple):
-    """A jump: it lies within ``half`` of ``value``; the amplitude before and after it, in the order of the sweep."""
+    """A jump in the middle of a ``step``, which it is known to; amplitude before and after it, in the sweep's order."""
 
     value: float
-    half: float = 0.0
+    step: float = 0.0
     before: float = np.nan
     after: float = np.nan
 
@@ -52,8 +52,7 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
         carried = (2 * near - far for near, far in beside)
         if abs(step[i]) <= least or any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
             continue
-        middle, half = 0.5 * (x[i] + x[i + 1]), 0.5 * abs(x[i + 1] - x[i])
-        found.append(AmplitudeJump(middle, half, heights[i], heights[i + 1]))
+        found.append(AmplitudeJump(0.5 * (x[i] + x[i + 1]), abs(x[i + 1] - x[i]), heights[i], heights[i + 1]))
     return found
 
 
@@ -86,14 +85,14 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         pairs = nearest_alike(*([jump.value for jump in jumps] for jumps in both), *kinds)
         rows += [(word, jump, expected[pairs[i]] if i in pairs else nothing) for i, jump in enumerate(seen)]
         rows += [(word, nothing, jump) for j, jump in enumerate(expected) if j not in pairs.values()]
-    (m, half), (t, step) = (np.array([row[k][:2] for row in rows], float).reshape(-1, 2).T for k in (1, 2))
+    (m, own), (t, step) = (np.array([row[k][:2] for row in rows], float).reshape(-1, 2).T for k in (1, 2))
     over = "jump"
     variables = {
         "jump_direction": labelled(over, np.array([row[0] for row in rows], str), "direction in which the jump is met"),
         "measured_jump": labelled(over, m, "measured jump (NaN: none was seen)", unit),
         "theory_jump": labelled(over, t, "predicted jump (NaN: none is predicted)", unit),
         "jump_difference": labelled(over, t - m, "predicted minus measured jump", unit),
-        "jump_tolerance": labelled(over, half + step, "half steps of both", unit),
+        "jump_tolerance": labelled(over, 0.5 * (own + step), "half steps of both", unit),
     }
     nearest = [[_nearest(one.get(word, ()), jump.value) for word, _, jump in rows] for one in drawn]
     return variables | intervals("theory_jump", over, nearest, unit, level)
@@ -220,12 +219,12 @@ def _given(theory: xr.Dataset, name: str, state: str, directions: list[str]) -> 
 
 
 def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jumps:
-    """The jumps of each direction: middle of the step in which they lie, half of it, amplitude before and after."""
+    """The jumps of each direction: middle and width of the step in which they lie, amplitude before and after."""
     found = {}
     for d, word in enumerate(directions):
         x, heights = (values, curves[:, d]) if word == "up" else (values[::-1], curves[::-1, d])
         steps = [(x[[i, j]], heights[[i, j]].tolist()) for i, j in jumps_in(x, heights)]
-        found[word] = [AmplitudeJump(at.mean(), 0.5 * np.ptp(at), *both) for at, both in steps]
+        found[word] = [AmplitudeJump(at.mean(), np.ptp(at), *both) for at, both in steps]
     return found
 
 
@@ -235,10 +234,10 @@ def _measured_jumps(measured: xr.Dataset, runs: dict[str, NDArray[Any]], directi
     if stated and "run" in measured["amplitude"].dims:
         found: dict[str, list[AmplitudeJump]] = {}
         words = measured["jump_direction"].values.astype(str)
-        half = 0.5 * measured["jump_step"].values if "jump_step" in measured else np.zeros(len(words))
+        steps = measured["jump_step"].values if "jump_step" in measured else np.zeros(len(words))
         for word in directions:
-            rows = zip(measured["jump_value"].values, half, words, strict=True)
-            named = [AmplitudeJump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
-            found[word] = sorted(named, key=lambda jump: jump.value, reverse=word == "down")
+            rows = zip(measured["jump_value"].values, steps, words, strict=True)
+            named = [AmplitudeJump(value, step) for value, step, w in rows if w == word]
+            found[word] = sorted(named, reverse=word == "down")
         return found
     return jumps_of_runs(*(runs[key] for key in ("value", "amplitude", "error", "direction")))

@@ -20,7 +20,6 @@ _JUMPS = {
     "before": ("amplitude before it", "m"),
     "after": ("amplitude behind it", "m"),
 }
-_WHOLE = np.array([[1.0], [2.0], [1.0], [1.0]])  # of a half step
 _NUMBER = "period number (0: none found, -1: too few turns)"
 FEW = 6  # turns of the drive below which no period number is sought
 
@@ -76,7 +75,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     words = np.array(directions, str)
     jumps = jumps_of_runs(omega, np.array(heights), np.array(errors), words)
     met = [word for word, found in jumps.items() for _ in found]
-    steps = np.array([one for found in jumps.values() for one in found], float).reshape(-1, 4).T * _WHOLE
+    steps = np.array([one for found in jumps.values() for one in found], float).reshape(-1, 4).T
     return xr.Dataset(
         {
             "amplitude": labelled("run", np.array(heights), "half the range of x", "m"),
