@@ -244,6 +244,7 @@ def session_measurement(
         )
         for item in chosen
     ]
+    omega, error = (np.array([float(motion[name]) for motion in motions]) for name in ("omega", "omega_error"))
     settings: dict[str, Any] = {
         "rho": (lambda p: p["k"] * length) if crank_force is None else crank_force * length,
     }
@@ -252,20 +253,17 @@ def session_measurement(
         settings["g"] = reference.gap(first["gap"], length)
     if shows == "response":
         # Steps that do not say how they were reached: up as long as the frequency rises.
-        omega = [float(motion["omega"]) for motion in motions]
         top = np.argmax(omega)
         words = [str(i.settings.get("direction", "up" if n <= top else "down")) for n, i in enumerate(chosen)]
         return measured_response(motions, words), settings
-    settings["omega"] = (float(motions[0]["omega"]), float(motions[0]["omega_error"]))
+    settings["omega"] = (omega.mean(), error[0])
     if shows == "sections":
         gaps = [reference.gap(item.settings["gap"], length)[0] for item in chosen]
-        omega = [float(motion["omega"]) for motion in motions]
-        if np.ptp(omega) > 1e-2 * np.mean(omega) or len(set(gaps)) < len(gaps):
+        if np.ptp(omega) > 1e-2 * omega.mean() or len(set(gaps)) < len(gaps):
             raise ValueError(
                 f"{len(chosen)} runs of {procedure!r}, {', '.join(i.run for i in chosen)}: a diagram over g needs runs "
                 "at one frequency, each with a gap of its own; a motion is one run: run = ..."
             )
-        settings["omega"] = (np.mean(omega), float(motions[0]["omega_error"]))
         return measured_sections(motions, "g", gaps, unit="m"), {n: settings[n] for n in ("rho", "omega")}
     (motion,) = motions
     if shows == "motion":
@@ -275,8 +273,8 @@ def session_measurement(
     moved = np.zeros(rise["section"].shape)
     moved[:, 0] = [reference.mean(rho / per)[0] for rho in rise["rho"].values]
     screw = first["gap"]
-    error = max(reference.gap(screw, a)[1] for a in (length, last))
-    settings = {"omega": settings["omega"], "g": (lambda p: reference.gap(screw, p["rho"] / per)[0], error)}
+    known = max(reference.gap(screw, a)[1] for a in (length, last))
+    settings = {"omega": settings["omega"], "g": (lambda p: reference.gap(screw, p["rho"] / per)[0], known)}
     return rise.assign(section=(rise["section"] - moved).assign_attrs(rise["section"].attrs)), settings
 
 
