@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -200,9 +201,18 @@ def _oscillator(friction: bool) -> System:
 
 
 def _guess(parts: Sequence[Decay]) -> FloatArray:
-    """First values: half a period between zeros, and a damping as that of the published car."""
-    halves = [np.diff(part.time[np.flatnonzero(np.diff(np.sign(part.x - np.mean(part.x[-20:]))))]) for part in parts]
-    return np.array([np.pi / np.median(np.concatenate(halves)), 1.0, 0.005, 0.0])
+    """First values from turning points: half a period between them; each swing is q times the one before."""
+    periods, ratios = [], []
+    for part in parts:
+        away = part.x - (np.mean(part.x[-20:]) if len(part.x) > 40 else 0.0)
+        turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
+        if len(turned) > 1:
+            periods.append(2 * np.mean(np.diff(part.time[turned])))
+            heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
+            ratios += [h / g for g, h in pairwise(heights) if g > 0]
+    period = np.median(periods) if periods else 1.4
+    b = -4 * np.log(min(np.median(ratios), 0.99) if ratios else 0.7) / period  # swing to swing: exp(-b T/4)
+    return np.array([np.sqrt((2 * np.pi / period) ** 2 + b**2 / 4), b, 0.005, 0.0])
 
 
 class _Method(NamedTuple):
