@@ -334,6 +334,30 @@ def test_a_belt_whose_speed_jumps_past_that_of_the_block_turns_the_friction_at_o
     np.testing.assert_allclose(run.u.values[-1, :2], [0.25 + 0.75 - 0.25 * 1.5**2, 0.5 - 0.75], atol=1e-13)
 
 
+def test_an_elastic_stop_that_jumps_away_is_left() -> None:
+    """From t = .3 on there is a gap of .04, in which a damper would still push: the mass crosses it at its speed."""
+    stop = ns.elements.ElasticStop(at="q", position=lambda t, u, p: p.y, stiffness=4.0, damping=0.5)
+    beside: dict[str, Any]
+    for beside in ({}, {"wall": ns.elements.Stop(at="q", position=9.0)}):
+        rig = ns.mechanical(1.0, 0.0, 0.0, inputs={"y": ""}, elements={"stop": stop, **beside})
+        steps = {"y": ns.Input([0, 0.3], [0.0, 0.25], between="steps")}
+        run = ns.simulate(rig, duration=0.35, samples=2, start={"v_q": 0.8}, inputs=steps)
+        decay, w = 0.8 * np.exp(-0.075), np.sqrt(4 - 0.25**2)  # x'' + .5 x' + 4 x = 0 up to then
+        x, v = decay * np.sin(0.3 * w) / w, decay * (np.cos(0.3 * w) - 0.25 / w * np.sin(0.3 * w))
+        assert x + 0.05 * v < 0.25
+        np.testing.assert_allclose(run.u.values[-1, :2], [x + 0.05 * v, v], atol=1e-13)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
+def test_an_input_is_as_large_as_it_is(method: str) -> None:
+    """A cubic whose third derivative is 6e12, and a step within 1e-12: inputs do not diverge."""
+    cart = ns.mechanical(1.0, 0.0, 0.0, forcing={"q": lambda t, p: p.f + p.g}, inputs={"f": ("N", "smooth"), "g": "N"})
+    t = np.linspace(0.0, 1e-3, 5)
+    given = {"f": ns.Input(t, 1e12 * t**3), "g": ([0.0, 5e-4, 5e-4 + 1e-12], [0.0, 0.0, 7.0])}
+    run = ns.simulate(cart, duration=1e-3, inputs=given, method=method)
+    np.testing.assert_allclose(run.u.values[-1, :2], [1e12 * 1e-15 / 20 + 7 * 0.125e-6, 0.25 + 3.5e-3], rtol=1e-9)
+
+
 def test_a_stop_that_would_jump_into_a_mass_is_refused() -> None:
     steps = {"y": ns.Input([0, 0.5], [0, 0.1], between="steps")}
     with pytest.raises(ValueError, match=r"moves the stop 'plate' and is held between its samples"):

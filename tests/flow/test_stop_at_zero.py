@@ -59,3 +59,23 @@ def test_each_impact_is_one(method: str, e: float) -> None:
         run = ns.simulate(system, duration=(1 + e) * fall, start={"x": height, "v": 0.0}, method=method)
         assert run["crossing_time"].values == pytest.approx([fall], rel=1e-8)
         assert run["u_after"].values[0, 1] == pytest.approx(e * fall, rel=1e-8)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
+def test_the_last_flights_are_no_way_through_the_floor(method: str) -> None:
+    """A ball rests at sqrt(2h/g) (1 + e)/(1 - e); its last flights, 1e-15 high, are below the rounding of its place."""
+    ball = ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        forcing={"q": lambda t, p: -p.g},
+        parameters={"g": 9.81, "e": 0.5},
+        elements={"floor": ns.elements.Stop(at="q", side=-1, restitution="e")},
+    )
+    rng = np.random.default_rng(7)
+    for g, e, height in zip(rng.uniform(5, 100, 40), rng.uniform(0.2, 0.7, 40), rng.uniform(0.5, 2, 40), strict=True):
+        end = np.sqrt(2 * height / g) * (1 + e) / (1 - e)
+        here = ball.with_parameters(g=g, e=e)
+        run = ns.simulate(here, duration=1.5 * end, start={"q": height}, samples=3, method=method)
+        assert run.u.sel(state="q").values[-1] == pytest.approx(0.0, abs=1e-12)
+        assert run.crossing_time.values[-1] == pytest.approx(end, abs=1e-6)

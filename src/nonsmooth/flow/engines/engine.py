@@ -145,11 +145,11 @@ class KernelMarch:
         self.kept.put(out)
         self._ask(state, _NO_STARTS if starts is None else starts)
 
-    def logged(self, state: State, until: float, most: float = np.inf) -> None:
-        """Ask for the log of point 0 to a time, in so many steps (in whole ``PATIENCE``)."""
+    def logged(self, state: State, until: float, limit: FloatArray, most: float = np.inf) -> None:
+        """Ask for the log of point 0 to a time, of states within a limit, in so many steps (in whole ``PATIENCE``)."""
         self._anywhere(0, LOGGED, 0)
         self.reals[:] = until, 0.0, -1.0, 0.0
-        self._ask(state, _NO_STARTS, most)
+        self._ask(state, _NO_STARTS, most, limit)
 
     def grown(self, i: int, state: State, count: int, unit: float, growth: Any) -> None:
         """Ask for ``count`` units of time of point i with its frame (``records.Growth``)."""
@@ -170,11 +170,11 @@ class KernelMarch:
         """A run that knows no section."""
         self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0, 0, -1
 
-    def _ask(self, state: State, starts: FloatArray, most: float = np.inf) -> None:
+    def _ask(self, state: State, starts: FloatArray, most: float = np.inf, limit: FloatArray | None = None) -> None:
         from nonsmooth.kernels.hybrid.records import Call
 
         self.left = most
-        self.call.put(Call(self.orders, self.reals, self.limit, starts, state.motion()))
+        self.call.put(Call(self.orders, self.reals, self.limit if limit is None else limit, starts, state.motion()))
 
 
 _of_thread = threading.local()

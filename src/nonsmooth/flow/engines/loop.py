@@ -268,9 +268,11 @@ class Engine(ABC):
         sampled = _samples(samples, n_u, n_m) if n else self._none[0]
         crossings, touches = Engine.room(self, tables) if room is None else room
         spare, march = self.touches_of_a_leg(), self.march()
-        given = NO_CHANGES if changes is None else changes
+        given, limit = NO_CHANGES if changes is None else changes, self.limit
+        if changes is not None:  # inputs are as large as they were given
+            limit = np.where(np.arange(n_u) < changes.first, limit, np.inf)
         state.counters[1] = int(state.settled)
-        march.logged(state, float(until), most)
+        march.logged(state, float(until), limit, most)
         march.log.put(records.Log(*(*sampled, *crossings, *touches, spare, *given)))
         code, system = self._run(march, tables)
         while code == codes.LOG_FULL:

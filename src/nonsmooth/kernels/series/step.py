@@ -14,6 +14,8 @@ from nonsmooth.kernels.series.polynomial import NONE
 from nonsmooth.kernels.series.rkf45 import first_step, hermite, quiet, stages, time_to_transition
 from nonsmooth.kernels.series.taylor import dense_states, fill_powers, step_length, trusted
 
+LEAST_STEP = 1e-3  # of a step's own length: what indicators do in less may be rounding, and so no crossing
+
 
 @inline
 def degree_of(form):
@@ -119,7 +121,7 @@ def length_of_step(i, form, net, work, r_max):
         h = max(1.0, memo[WAITED])
     memo[place.PLANNED] = h
     if rkf and form.step <= 0.0 and work.dwell[mode] < 2.0 * h:  # a mode that was left soon the last time
-        h = min(h, 1.1 * time_to_transition(mode, work.J0, n, net, h))
+        h = max(LEAST_STEP * h, min(h, 1.1 * time_to_transition(mode, work.J0, n, net, h)))
     tally[place.LANDING] = 0
     if h >= r_max * (1.0 - 1e-13):
         h = r_max

@@ -63,7 +63,10 @@ class ElasticStop(Contact):
         push = self.force(here.put("contact"))
         if here.phase == "open":
             return [Leaving("contact", [inside, Condition(push, 1, "push")])]
-        return [Leaving("open", [Condition(push, -1, "push")])]
+        jumps = (
+            [Leaving("open", [outside])] if here.make.driven(here.where) else []
+        )  # else it pulls before it is outside
+        return [*jumps, Leaving("open", [Condition(push, -1, "push")])]
 
 
 @dataclass(frozen=True, kw_only=True)
