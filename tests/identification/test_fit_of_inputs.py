@@ -137,3 +137,30 @@ def test_two_records_of_a_driven_mass_with_a_stop_and_friction_whose_sensor_is_l
     for name, value in rig.values.items():
         assert abs(found[name] - value) < 4 * found.uncertainty[name]
     assert abs(found.extra["q.delay"].value - late) < 4 * found.extra["q.delay"].uncertainty
+
+
+@pytest.mark.parametrize(
+    ("scale", "last", "words"),
+    [
+        (
+            1.0,
+            300,
+            "591 of 1190 readings of the record lie before the first or behind the last sample of the input 'f'",
+        ),
+        (1e3, 600, "1 of 600 samples of the input 'f' lie within the time of the record"),
+        (1.0, 600, ""),
+    ],
+)
+def test_inputs_of_other_times_than_the_readings_are_said(
+    recording: dict[str, Any], scale: float, last: int, words: str
+) -> None:
+    """The first half of the force; the force by a clock of milliseconds."""
+    t, force = recording["motor"]
+    given = {**recording, "motor": (scale * t[:last], force[:last])}
+    found = ns.fit(rig(), given, ["k"], inputs={"f": "motor"}, progress=False, tries=1, window=0.2)
+    assert words in "; ".join(found.notes) if words else "input" not in "; ".join(found.notes)
+
+
+def test_a_window_without_readings_is_refused(recording: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"window = 0\.001 holds no three readings: give at least 0\.02, twice"):
+        ns.fit(rig(), recording, ["k"], inputs={"f": "motor"}, progress=False, window=1e-3)

@@ -25,6 +25,14 @@ def test_header_with_units_and_comments() -> None:
     assert any("'force': 1 blank fields dropped" in w for w in recording.warnings)
 
 
+def test_a_number_that_marks_a_missing_value_is_missing() -> None:
+    table = b"t (s), x (m)\n0, 1\n1, -999\n2, 3\n"
+    for na in (("-999",), ["-999", "9999"]):
+        x = parse_recording(table, "x.csv", Options(na=na)).channel("x")
+        assert (x.values.tolist(), x["time"].values.tolist()) == ([1, 3], [0, 2])
+    assert parse_recording(table, "x.csv").channel("x").values.tolist() == [1, -999, 3]
+
+
 def test_a_packed_file_is_read_whole_or_not_at_all() -> None:
     """Files joined after they were packed are one, as gzip has it; no part of one that is cut short is read."""
     lines = [b"t (s), x (m)\n", *(b"%d, %d\n" % (i, i * i) for i in range(200))]

@@ -377,3 +377,27 @@ def test_a_refusal_says_what_to_do(data: bytes, options: dict[str, Any], message
     path.write_bytes(data)
     with pytest.raises(ns.DataFileError, match=message):
         ns.load_recording(path, **options)
+
+
+def test_arrays_of_hdf5_with_rates_of_their_own(tmp_path: Path) -> None:
+    """x at .1 s, force every .2 s, and an array of another length that has no rate."""
+
+    def fill(file: Any) -> None:
+        run = file.create_group("trial")
+        for name, values, said in (("force", [0, 1, 2], {"fs": 5.0}), ("x", range(6), {"dt": 0.1}), ("y", [7] * 4, {})):
+            run[name] = np.array(values, float)
+            run[name].attrs.update({"units": "m", **said})
+
+    path = tmp_path / "a.h5"
+    path.write_bytes(hdf5(fill))
+    with pytest.warns(ns.recordings.RecordingWarning, match=r"'y': has no rate, and none of the others has its length"):
+        recording = ns.load_recording(path)
+    assert recording.channel("x")["time"].values == pytest.approx(0.1 * np.arange(6))
+    assert recording.channel("force")["time"].values == pytest.approx([0, 0.2, 0.4])
+    for one, step in (("x", 0.1), ("force", 0.2)):
+        alone = ns.load_recording(path, columns={"q": f"trial.{one}"})
+        assert np.diff(alone.channel("q")["time"].values) == pytest.approx(step)
+    with pytest.raises(
+        ns.errors.DataFileError, match=r"several rates, 'trial\.x' at 10 Hz, 'trial\.force' at 5 Hz; choose"
+    ):
+        ns.load_recording(path, columns={"x": "trial.x", "f": "trial.force"})

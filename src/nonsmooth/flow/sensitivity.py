@@ -325,6 +325,8 @@ def sensitivity(
     drive = driven(system, inputs)
     course = None if drive is None else drive.at(system.values)
     names = tuple(parameters)
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise ValueError(f"parameters names {twice[0]!r} twice; name each once")
     flow = VariationalFlow.of(system, names)
     _, length = run_length(system, periods, duration, system.period())
     found, log = variation(system, flow, first_state(system, start, mode), length, course)

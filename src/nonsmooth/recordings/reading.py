@@ -254,6 +254,7 @@ class Group(dict[str, Any]):
     ) -> None:
         super().__init__(members or {})
         self.units, self.rate, self.run = dict(units or {}), rate, ""
+        self.rates: dict[str, float] = {}  # of arrays that have one of their own
         self.attrs: dict[str, dict[str, str]] = {}
         self.notes: dict[str, str] = {}
 

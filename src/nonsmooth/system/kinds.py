@@ -279,7 +279,8 @@ def float_array(values: Any, name: str) -> FloatArray:
             return np.array([real_number(value, name) for value in array.ravel()]).reshape(array.shape)
     except (TypeError, ValueError) as error:
         raise TypeError(f"{name} must be real numbers, not {shortened(values)} ({error})") from None
-    raise TypeError(f"{name} must be real numbers, not {shortened(values)}")
+    seconds = ": give seconds, (t - t[0]) / np.timedelta64(1, 's')" if array.dtype.kind in "mM" else ""
+    raise TypeError(f"{name} must be real numbers, not {shortened(values)}{seconds}")
 
 
 def swept_values(system: System, parameter: str, values: Any) -> FloatArray:

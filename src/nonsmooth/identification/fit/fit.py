@@ -160,6 +160,8 @@ def fit(
         raise ValueError("leave_out=True leaves out parts of records over time; readings of steady states have none")
     if leave_out and not free:
         raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
+    if window is not None and problem.records and window < (least := 2 * problem.step.min()):
+        raise ValueError(f"window = {window:g} holds no three readings: give at least {least:g}, twice their step")
     begin = None if start is None else np.tile(start_states(problem.system, start)[0], (len(problem.records), 1))
     check_keys(profile, problem.unknowns.names, "profile", "an unknown", "this fit")
     best, left = best_of(problem, begin, free, window or np.inf, tries, seed, progress), list[str]()

@@ -223,6 +223,7 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         notes += _of_readings(grown, c, data)
     if found.correlation > 2.0:
         notes.append(f"the residuals correlate over {found.correlation:.3g} readings; the uncertainties account for it")
+    notes += [note for i in range(records) for note in _of_inputs(grown, i)]
     modes = list(problem.system.modes)
     for record, mode, excess in grown.begins:
         label = f"run {problem.records[record].name} begins" if records > 1 else "the record begins"
@@ -245,6 +246,28 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         notes.append(
             "rms of the residuals, over all: 1; " + "; ".join(f"{name}: {rms:.2f}" for name, rms, _ in places[:4])
         )
+    return notes
+
+
+def _of_inputs(grown: Grown, run: int) -> list[str]:
+    """Notes on the inputs of a run that were sampled at other times than its readings."""
+    record, values = grown.problem.records[run], grown.problem.at(grown.theta, run).values
+    if record.drive is None or values is None:
+        return []
+    course = record.drive.at(dict(zip(grown.problem.system.parameters, values.tolist(), strict=True)))
+    time, notes = record.time, []
+    label = f"run {record.name}" if len(grown.problem.records) > 1 else "the record"
+    for name, (t, _) in zip(record.drive.inputs, course.courses, strict=True):
+        within = int(np.count_nonzero((t >= time[0]) & (t <= time[-1])))
+        off = int(np.count_nonzero((time < t[0]) | (time > t[-1])))
+        words = f"of {label} lie before the first or behind the last sample of the input {name!r}"
+        if len(t) > 1 and off > _FEW * len(time):
+            notes.append(f"{off} of {len(time)} readings {words} ({t[0]:.6g} to {t[-1]:.6g}): its value there is kept")
+        if within < min(_FEW * len(t), len(t) - 2):
+            notes.append(
+                f"{within} of {len(t)} samples of the input {name!r} lie within the time of {label}: see "
+                "whether both count time from one instant, in one unit"
+            )
     return notes
 
 
@@ -300,7 +323,8 @@ def _aliases(grown: Grown) -> list[str]:
         window.record: (window, start) for window, start in [*zip(problem.pieces, grown.starts, strict=True)][::-1]
     }
     for window, start in firsts.values():
-        k = min(_SEEN, len(window.time) - 1)
+        if not (k := min(_SEEN, len(window.time) - 1)):
+            continue
         time = np.sort(
             rng.uniform(window.time[0], window.time[k], _BETWEEN * k)
         )  # at no rate, which could have aliases too

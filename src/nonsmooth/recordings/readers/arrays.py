@@ -38,9 +38,15 @@ def read(data: bytes, reading: Reading) -> None:
         return
     containers = list(_containers("", variables, 0))
     holds = _is_vector if reading.rate is None else _is_series
-    vectors = [(path, node) for path, node in containers if any(map(_is_series if node.rate else holds, node.values()))]
+
+    def rated(node: Group) -> bool:
+        return bool(node.rate or node.rates)
+
+    vectors = [
+        (path, node) for path, node in containers if any(map(_is_series if rated(node) else holds, node.values()))
+    ]
     keys = [(path, node, _axis_of(node, reading.axis)) for path, node in vectors]
-    found = [(path, node, key) for path, node, key in keys if key is not None or reading.rate or node.rate]
+    found = [(path, node, key) for path, node, key in keys if key is not None or reading.rate or rated(node)]
     if not found:
         names = [f"{path}.{key}".lstrip(".") for path, node in vectors for key, v in node.items() if _is_vector(v)]
         raise reading.error(
@@ -56,9 +62,25 @@ def read(data: bytes, reading: Reading) -> None:
         run = node.run or path or _TOP
         notes = {f"note_{name}": text for name, v in node.items() if (text := _note(v))}
         reading.run_attrs.setdefault(run, {}).update(node.notes | notes)
-        reading.traces += traces_of(_table(run, path, node, key, reading), reading)
+        for part in [node] if key or reading.rate else _by_rate(run, node, reading):
+            reading.traces += traces_of(_table(run, path, part, key, reading), reading)
         if len(reading.traces) > MAX_COLUMNS:
             raise reading.error("", f"holds more than {MAX_COLUMNS} channels")
+
+
+def _by_rate(run: str, node: Group, reading: Reading) -> list[Group]:
+    """The arrays of a container, those of one rate together; one without a rate has that of another of its length."""
+    if not node.rates:
+        return [node]
+    parts = dict[float, Group]()
+    arrays = {name: value for name, value in node.items() if _is_array(value)}
+    lengths = {max(arrays[name].shape): rate for name, rate in node.rates.items() if name in arrays}
+    for name, value in arrays.items():
+        if rate := node.rates.get(name) or node.rate or lengths.get(max(value.shape)):
+            parts.setdefault(rate, Group({}, node.units, rate))[name] = value
+        else:
+            reading.of(run, name, "has no rate, and none of the others has its length; left out (give rate=)")
+    return list(parts.values())
 
 
 def _containers(path: str, node: Any, depth: int) -> Iterator[tuple[str, Group]]:
@@ -148,20 +170,27 @@ def _units(node: Group, names: list[str], reading: Reading, run: str) -> dict[st
 def _chosen(variables: Mapping[str, Any], reading: Reading) -> FieldTable:
     """The channels that ``columns`` names by path: ``"data.x"``, ``"runs(2).x"``, ``"M(:,3)"``."""
     found = [
-        (f"{path}.{name}".lstrip("."), value, node.units.get(name, ""), node.rate)
+        (f"{path}.{name}".lstrip("."), value, node.units.get(name, ""), node.rates.get(name, node.rate))
         for path, node in _containers("", variables, 0)
         for name, value in node.items()
         if _is_array(value)
     ]
     arrays = {path: value for path, value, _, _ in found}
     units = {path: unit for path, _, unit, _ in found}
-    fields = []
+    rates = {path: rate for path, *_, rate in found}
+    fields, taken = [], dict[float, str]()
     for ours, theirs in (reading.columns or {}).items():
         wanted, unit = theirs if isinstance(theirs, tuple) else (theirs, None)
         values = _pick(wanted, arrays, reading)
+        path = list(arrays)[wanted] if isinstance(wanted, int) else _PICK.sub(r"\g<path>", wanted)
+        if rate := rates.get(path):
+            taken.setdefault(rate, path)
         fields.append(Field(ours, units.get(str(wanted), "") if unit is None else unit, values, str(wanted)))
-    rate = reading.rate or next((rate for *_, rate in found if rate), None)
     axis = next((field for field in fields if field.name == reading.axis), None)
+    if axis is None and reading.rate is None and len(taken) > 1:
+        each = ", ".join(f"{path!r} at {rate:g} Hz" for rate, path in taken.items())
+        raise reading.error("", f"columns names arrays of several rates, {each}; choose those of one, or leave it out")
+    rate = reading.rate or next(iter(taken), None)
     if axis is None and rate is None:
         raise reading.error("", f"columns names no {reading.axis!r}; add it, or give the sample rate in Hz, rate=...")
     n = len((axis or fields[0]).values)

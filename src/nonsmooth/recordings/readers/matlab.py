@@ -132,8 +132,9 @@ def _plain(value: Any) -> Any:
     return value if value.dtype.kind in "fiubc" else None
 
 
-#: Attributes that give the sample rate of a group's arrays, in Hz.
+#: Attributes that give the sample rate of a group's arrays, in Hz, and those that give the time between samples.
 _RATES = ("sample_rate", "sampling_rate", "sampling_frequency", "rate", "fs")
+_STEPS = ("dt", "sample_interval", "sampling_interval")
 
 
 def load_hdf5(data: bytes, reading: Reading, *, matlab: bool) -> dict[str, Any]:
@@ -158,7 +159,8 @@ def load_hdf5(data: bytes, reading: Reading, *, matlab: bool) -> dict[str, Any]:
             if isinstance(found, Group):
                 attrs = group[name].attrs
                 found.units[name] = _word(attrs.get("units", attrs.get("unit", "")))
-                found.rate = found.rate or _rate(group[name])
+                if own := _rate(group[name]):
+                    found.rates[name] = own
         return found
 
     def value_of(item: Any, place: str, depth: int) -> Any:
@@ -217,8 +219,11 @@ def _word(value: Any) -> str:
 
 
 def _rate(item: Any) -> float | None:
-    found = [np.asarray(item.attrs[name]) for name in _RATES if name in item.attrs]
-    return float(found[0].ravel()[0]) if found and found[0].size == 1 and found[0].dtype.kind in "iuf" else None
+    for name in (*_RATES, *_STEPS):
+        said = np.asarray(item.attrs.get(name, ""))
+        if said.size == 1 and said.dtype.kind in "iuf" and float(said.ravel()[0]) > 0:
+            return float(said.ravel()[0]) ** (-1 if name in _STEPS else 1)
+    return None
 
 
 class _Column(list[Any]):

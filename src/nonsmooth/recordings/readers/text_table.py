@@ -141,7 +141,7 @@ def read_cells(
     """
     n = len(labels)
     head = [row for _, row in zip(range(_SNIFFED), table, strict=False)]
-    decimal, thousands, na = numerals
+    decimal, thousands, na = numerals.decimal, numerals.thousands, {*numerals.na}
     if decimal is None:  # a comma, if there are fields that are numbers with one and none that are with a point
         fields = [row[k] for _, row in head for k in wanted if k < len(row)]
         commas, points = (any(mark in f and number(f, mark) is not None for f in fields) for mark in ",.")
@@ -160,7 +160,7 @@ def read_cells(
             last_short, slow = False, []
             for column in ordered:
                 texts = [] if stamps is not None and column == stamped else [fields[column] for _, fields in chunk]
-                plain = _plain(texts, decimal)
+                plain = None if not na.isdisjoint(map(str.strip, texts)) else _plain(texts, decimal)
                 if plain is None:
                     slow.append(column)
                 else:
