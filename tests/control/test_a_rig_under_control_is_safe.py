@@ -155,6 +155,21 @@ def test_a_phase_that_stands_is_said():
     assert branch is None and "must count on" in sentence
 
 
+def test_readings_that_are_missing_are_said(whole):
+    """From a reading of the third point on: the point that was there is kept, and the force is off."""
+
+    class Gap(OwnRig):
+        def read(self):
+            phase, position = super().read()
+            return phase + 5 * (self.readings >= at), position
+
+    at = whole[2][2] - 7
+    rig = Gap(per_turn=20)
+    branch, sentence, there = held(rig)
+    assert branch.sizes["point"] == len(there) >= 1 and rig.force == 0.0
+    assert "between two readings, a turn or more: some are missing" in sentence
+
+
 @pytest.mark.slow
 def test_delays_and_rates(capsys):
     rows = []

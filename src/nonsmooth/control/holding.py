@@ -17,6 +17,7 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.control.rig import Guard, Rig
+from nonsmooth.errors import SolveError
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import Range, above, at_least, real_number
 
@@ -49,6 +50,11 @@ class Controller:
             phase, position = self.rig.read()
             if not rows:
                 begin = phase
+            elif phase - rows[-1][0] >= 1.0:
+                why = f"the phase of the drive went from {rows[-1][0]:.6g} to {phase:.6g} between two readings"
+                raise SolveError(
+                    f"stopped: {why}, a turn or more: some are missing, or it is not in turns", status="stopped"
+                )
             elif phase - begin >= turns:
                 break
             force = 0.0
