@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.flow.mode_fields import ModeField, arguments, mode_field
+from nonsmooth.flow.mode_fields import ModeField, mode_field
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -170,10 +171,7 @@ def _under_forcing(
 
 def _fixed(traced: Traced, reset: Sequence[Any], u: FloatArray, values: FloatArray, memory: FloatArray) -> bool:
     """Return whether a reset leaves the state alone."""
-    import sympy as sp
-
-    image = sp.lambdify(arguments(traced), list(reset), modules="numpy")
-    moved = np.abs(np.array(image(0.0, u, values, memory), dtype=float) - u)
+    moved = np.abs(numeric(traced, tuple(reset))(values, 0.0, u, memory) - u)
     return bool((moved <= 1e-12 * np.maximum(np.abs(u), 1e-3)).all())
 
 

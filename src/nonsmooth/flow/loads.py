@@ -19,6 +19,7 @@ from nonsmooth.arrays import BoolArray
 from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.outputs import output_values
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.loop import Engine
@@ -105,30 +106,24 @@ class Meter:
     # Values of expressions
 
     @cached_property
-    def _function(self) -> Callable[..., Any]:
+    def _function(self) -> Callable[..., FloatArray]:
         """Gaps of striking elements, rates, speeds w.v, directions (in order of their states), powers."""
-        from sympy import lambdify
-
         t = self.description.traced
-        every = [
+        every = (
             *self.gaps,
             *(load.rate for load in self.elements),
             *(load.moved(t.u) for load in self.elements),
             *(self.elements[k].direction[i] for k in self.striking for i in self.elements[k].direction),
             *self.loads.powers.values(),
-        ]
-        function: Callable[..., Any] = lambdify([t.t, *t.u, *t.m, *t.p], every, modules="numpy", cse=True)
-        return function
+        )
+        return numeric(t, every)
 
     def values(
         self, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray
     ) -> tuple[FloatArray, ...]:
         """Those at N instants, the instants first; ``parameters`` are one row, or one for each instant."""
         t, count, n = self.description.traced, len(self.elements), len(self.striking)
-        columns = (time, *np.nan_to_num(u).T, *memory.T[: len(t.m)], *parameters.T[: len(t.p)])
-        found = np.empty((len(time), n + 2 * count + self._entries + len(self.loads.powers)))
-        for i, value in enumerate(self._function(*columns)):
-            found[:, i] = value
+        found = self._function(parameters, time, np.nan_to_num(u), memory)
         cuts = np.cumsum([n, count, count, self._entries])
         gap, rate, moved, entries, power = np.split(found, cuts, axis=1)
         direction, at = np.zeros((len(time), n, len(t.u))), 0
@@ -150,15 +145,11 @@ class Meter:
 
     def constraints(self, mode: str, values: FloatArray, time: float, u: FloatArray, memory: FloatArray) -> FloatArray:
         """The derivatives in the states of what the elements keep at zero in a mode, (constraints, n)."""
-        from sympy import diff, lambdify
-
         t = self.description.traced
         held = [load for load in self.loads.held(mode) if load.rate is not None]
-        kept = [e for load in held for e in dict.fromkeys((load.rate, load.where))]
-        rows = [[diff(e, one) for one in t.u] for e in kept]
-        columns = (time, *u, *memory[: len(t.m)], *values[: len(t.p)])
-        found = lambdify([t.t, *t.u, *t.m, *t.p], rows, modules="numpy")(*columns) if rows else []
-        return np.array(found, dtype=float).reshape(-1, len(t.u))
+        kept = tuple(e for load in held for e in dict.fromkeys((load.rate, load.where)))
+        found: FloatArray = numeric(t, kept, t.u)(values, time, u, memory)[:, 1:]
+        return found
 
     # Impacts
 

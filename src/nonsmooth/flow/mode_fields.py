@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.system.derived.patterns import STEP
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.rows import Rows
@@ -64,31 +65,32 @@ class _Formulas(ModeField):
     """From expressions."""
 
     def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
-        import sympy as sp
-
         super().__init__(traced, mode, places)
-        u = [traced.u[i] for i in self.own]
-        f = [sp.sympify(traced.fields[mode][i]) for i in self.own]
-        jacobian = [e.diff(s) for e in f for s in u]
-        derived = [*jacobian, *(e.diff(traced.p[k]) for e in f for k in places)]
-        self._field = sp.lambdify(arguments(traced), [*f, *derived], modules="numpy")
-        self._indicators, slopes = _indicators(traced)
-        moving = {*traced.u}
-        self.linear = not any(e.free_symbols & moving for e in jacobian)
-        self.affine = self.linear and not any(e.free_symbols & moving for e in slopes)
+        self._f = tuple(traced.fields[mode][i] for i in self.own)
+        self._u = tuple(traced.u[i] for i in self.own)
+        self._field = numeric(traced, self._f, (*self._u, *(traced.p[k] for k in places)))
+        self._h = numeric(traced, traced.indicators, traced.u)
+
+    @cached_property
+    def linear(self) -> bool:  # type: ignore[override]
+        return not any(e.diff(s).free_symbols & {*self.traced.u} for e in self._f for s in self._u)
+
+    @cached_property
+    def affine(self) -> bool:  # type: ignore[override]
+        u = self.traced.u
+        return self.linear and not any(e.diff(s).free_symbols & {*u} for e in self.traced.indicators for s in u)
 
     def evaluate(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        found, n = _numbers(self._field, t, u, values, memory), len(self.own)
-        f, J, slopes = np.split(found, [n, n + n * n], axis=-1)
-        return f, J.reshape(*f.shape, n), slopes.reshape(*f.shape, len(self.places))
+        found, n = self._field(values, t, u, memory), 1 + len(self.own)
+        return found[..., 0], found[..., 1:n], found[..., n:]
 
     def indicators(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        found, n = _numbers(self._indicators, t, u, values, memory), len(self.traced.indicators)
-        return found[..., :n], found[..., n:].reshape(*found.shape[:-1], n, len(self.traced.u))
+        found = self._h(values, t, u, memory)
+        return found[..., 0], found[..., 1:]
 
 
 class _Numbers(ModeField):
@@ -156,27 +158,3 @@ def held_places(traced: Traced, mode: int, values: FloatArray) -> tuple[Rows, li
     rows = patterns.rows_at(values)
     held = rows.held(pattern)
     return rows, [np.array([rows.parts[k].where.values, rows.rate(k, patterns.mode).values]) for k in held]
-
-
-def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:
-    """The numbers that a function gives at a time (m,), or at several (T, m)."""
-    with np.errstate(all="ignore"):
-        found = function(t, u, values, memory)
-    if np.ndim(t) == 0:
-        return np.array(found, dtype=float)
-    return np.array([np.broadcast_to(one, np.shape(t)) for one in found], dtype=float).reshape(len(found), np.size(t)).T
-
-
-def arguments(traced: Traced) -> list[Any]:
-    """The arguments of a function that is made of a system's expressions."""
-    return [traced.t, list(traced.u), list(traced.p), list(traced.m)]
-
-
-@lru_cache(maxsize=8)
-def _indicators(traced: Traced) -> tuple[Any, list[Any]]:
-    """The indicators of a system with their slopes as a function of numbers, and the slopes as expressions."""
-    import sympy as sp
-
-    h = [sp.sympify(e) for e in traced.indicators]
-    slopes = [e.diff(s) for e in h for s in traced.u]
-    return sp.lambdify(arguments(traced), [*h, *slopes], modules="numpy"), slopes

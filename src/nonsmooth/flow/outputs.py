@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -27,9 +26,8 @@ def output_values(
     result = np.full((len(time), len(traced.output_names)), np.nan)
     for m in np.unique(mode):
         here = np.flatnonzero(mode == m)
-        columns = (time[here], *u[here].T, *memory[here].T, *parameters)
-        for i, function in enumerate(_functions(traced, int(m))):
-            result[here, i] = function(*columns)
+        shown = numeric(traced, tuple(output[int(m)] for output in traced.outputs))
+        result[here] = shown(parameters, time[here], u[here], memory[here])
     names = [] if traced.decider is None else [f"{part.name}_force" for part in traced.decider.make.parts]
     if names and len(result) and all(name in traced.output_names for name in names):
         forces = np.array([traced.output_names.index(name) for name in names])
@@ -48,8 +46,6 @@ def _shared(
     forces: FloatArray,
 ) -> FloatArray:
     """The forces of elements (N, elements), those that are not unique within their bounds."""
-    from sympy import lambdify
-
     rows = None if decider.rows is None else decider.rows.rows_at(parameters)
     for m in np.unique(mode):
         here = np.flatnonzero(mode == m)
@@ -58,8 +54,8 @@ def _shared(
             if rows is not None:
                 found: FloatArray = rows.augmented_all(u[here], time[here]) @ law.values
                 return found
-            of = lambdify([traced.t, *traced.u, *traced.m, *traced.p], law, modules="numpy")
-            return np.broadcast_to(of(time[here], *u[here].T, *memory[here].T, *parameters), here.shape)
+            of: FloatArray = numeric(traced, (law,))(parameters, time[here], u[here], memory[here])[:, 0]
+            return of
 
         forces[here] = (rows or decider.make).shared(*decider.modes[int(m)], forces[here], value)
     return forces
@@ -69,8 +65,6 @@ def out_of_bounds(traced: Traced, points: FloatArray, high: FloatArray, low: Flo
     """Marks of the extremes (..., P, O) of forces that a kernel does not know.
 
     Elements that bear one load together share it by least norm within their bounds; kernels know nothing of these."""
-    from sympy import lambdify
-
     found = np.zeros(high.shape, dtype=bool)
     known = traced.patterns or traced.decider
     if known is None or known.make.rubbing:
@@ -87,16 +81,7 @@ def out_of_bounds(traced: Traced, points: FloatArray, high: FloatArray, low: Flo
         elif element.exceeds or not most.free_symbols <= set(traced.p):
             beyond |= True
         else:
-            bound = lambdify([traced.p], most, modules="numpy")(points.T) * np.ones(len(points))
+            bound = numeric(traced, (most,))(points)[:, 0]
             beyond |= np.maximum(high[..., i], -low[..., i]) > (1.0 + ROUNDING) * bound
     found[..., list(of.values())] = beyond[..., None]
     return found
-
-
-@lru_cache(maxsize=128)
-def _functions(traced: Traced, mode: int) -> tuple[Callable[..., Any], ...]:
-    """The outputs in one mode, of time, states, memory and parameters; to write them costs more than a short run."""
-    from sympy import lambdify
-
-    arguments = [traced.t, *traced.u, *traced.m, *traced.p]
-    return tuple(lambdify(arguments, output[mode], modules="numpy", cse=True) for output in traced.outputs)

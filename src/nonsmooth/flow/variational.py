@@ -22,6 +22,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.saltation import Jump, Touch, chained, of_one_instant
 from nonsmooth.kernels.hybrid.kept import Segments
+from nonsmooth.system.symbolic.numeric import numeric
+from nonsmooth.system.symbolic.traced import along
 from nonsmooth.system.transition import phase_slopes, varying_phases
 
 if TYPE_CHECKING:
@@ -209,14 +211,17 @@ class VariationalFlow:
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
         """Indicator ``i`` at (t, z) with its first two derivatives along the flow of ``mode``, and gradients of all."""
         if (i, mode) not in self._touches:
-            from nonsmooth.system.codegen.variations import touch_function
-
-            self._touches[i, mode] = touch_function(self.traced, self.places, i, mode)
+            now = self.traced
+            orders = [now.indicators[i]]
+            for _ in range(2):
+                orders.append(along(orders[-1], now.t, now.u, now.fields[mode]))
+            variables = (*now.u, *now.m, now.t, *(now.p[k] for k in self.places))
+            self._touches[i, mode] = numeric(now, tuple(orders), variables, quick=True)
         numbers = np.asarray(z, dtype=float).tolist()
         n, n_u = self.n, self.n_u
-        found = self._touches[i, mode](float(t), numbers[:n_u], [*np.asarray(values).tolist(), *numbers[n_u:]])
+        found = self._touches[i, mode](np.asarray(values).tolist(), float(t), numbers[:n_u], numbers[n_u:])
         parts: list[Any] = []
-        for row in np.array(found).reshape(3, -1):  # each with its slopes in z, t, p
+        for row in np.array(found).reshape(3, -1):
             parts += [float(row[0]), row[1 : 1 + n], float(row[1 + n]), row[2 + n :]]
         return Touch(*parts)
 
@@ -236,16 +241,13 @@ class VariationalFlow:
         """Forcing period T and dT/dp (n_active,); infinite and zeros where there is none."""
         if self.traced.period is None:
             return np.inf, self._no_timing
-        numbers = self._period(*np.asarray(values, dtype=float).tolist())
+        numbers = self._period(np.asarray(values, dtype=float).tolist())
         return float(numbers[0]), np.array(numbers[1:], dtype=float)
 
     @cached_property
     def _period(self) -> Any:
-        import sympy as sp
-
-        p, period = self.traced.p, self.traced.period
-        assert period is not None
-        return sp.lambdify(p, [period, *(period.diff(p[i]) for i in self.places)], modules="math")
+        slopes = tuple(self.traced.p[i] for i in self.places)
+        return numeric(self.traced, (self.traced.period,), slopes, quick=True)
 
     @property
     def n_moving(self) -> int:

@@ -18,6 +18,7 @@ from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, name_axes, only_states, symbol_of
 from nonsmooth.system.kinds import Range
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,23 +71,17 @@ def regions(
 
 def _margins(system: System, names: list[str], first: Any, second: Any, t: float) -> NDArray[np.float64]:
     """The signed indicators of the condition that leaves the first mode, in units of eta where smoothed: (R, ...)."""
-    import sympy as sp
-
     sharp = system.smoothed(None).traced
     rows = next((item.rows for item in sharp.transitions if item.source == 0 and item.rows), None)
     if rows is None:
         raise ValueError(f"no condition on the state leaves the first mode of {system.name!r}: it has no regions")
     eta = system.eta if system.is_smoothed else 1.0
-    values = dict(zip(sharp.p, (system.values[name] for name in sharp.parameter_names), strict=True))
-    values |= dict.fromkeys(sharp.m, 0.0) | {sharp.t: t}
-    values |= {symbol: 0.0 for symbol, name in zip(sharp.u, sharp.state_names, strict=True) if name not in names}
-    axes = [sharp.u[sharp.state_names.index(name)] for name in names]
-    margins = []
-    for row in rows:
-        width = eta[sharp.indicator_names[row.indicator]] if isinstance(eta, dict) else eta
-        evaluate = sp.lambdify(axes, row.sign * sharp.indicators[row.indicator].subs(values) / width, "numpy")
-        margins.append(np.broadcast_to(evaluate(first, second), first.shape))
-    return np.array(margins, dtype=float)
+    u = np.zeros((first.size, len(sharp.u)))
+    u[:, [sharp.state_names.index(name) for name in names]] = np.stack([first.ravel(), second.ravel()], axis=1)
+    h = numeric(sharp, sharp.indicators)(system.parameter_vector(), t, u, np.zeros(len(sharp.m)))
+    width = [eta[sharp.indicator_names[row.indicator]] if isinstance(eta, dict) else eta for row in rows]
+    signs = np.array([row.sign for row in rows]) / width
+    return np.asarray((h[:, [row.indicator for row in rows]] * signs).T.reshape(len(rows), *first.shape))
 
 
 def _draw(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64], band: bool) -> None:

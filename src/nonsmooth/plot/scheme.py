@@ -226,7 +226,7 @@ class _SchemeReader:
             left, right = (right, GROUND) if weights[right] < 0 else (GROUND, right)
         else:
             pulls = weights[right] < 0
-        moves = sp.lambdify(self.t, rest.subs(self.values)) if rest.has(self.t) else None
+        moves = (lambda t: self.number(rest.subs(self.t, t))) if rest.has(self.t) else None
         words = self.text(rest) if rest != 0 else ""
         return Link(kind, left, right, label, self.number(rest), words, damped=damped, pulls=pulls, gap_at=moves)
 

@@ -327,7 +327,7 @@ def _with_period(
     if period is not None and timed and period != found:
         Domain(traced).check({name: values[symbol] for name, symbol in symbols.p.items()})
         plain = str(period.subs({symbol: sp.Symbol(name) for name, symbol in symbols.p.items()}))
-        check_period(expressions, traced.t, values, float(period.subs(values)), plain)
+        check_period(traced, expressions, [*values.values()], float(period.subs(values)), plain)
     return traced, timed and period is None
 
 

@@ -12,6 +12,7 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, unknown
 from nonsmooth.system.kinds import real_number
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import call_vector
 
@@ -60,15 +61,13 @@ def _check(symmetry: Symmetry, traced: Traced, values: Mapping[sp.Symbol, float]
     later = traced.t + symmetry.shift * (traced.period if traced.period is not None else 0)
     moved = dict(zip(traced.u, symmetry.map, strict=True)) | {traced.t: later}
     jacobian = sp.Matrix(symmetry.map).jacobian(traced.u)
-    order = [*values, traced.t, *traced.u, *traced.m]
+    point = [random.uniform(0.1, 0.9, (5, *size)) for size in ((), (len(traced.u),), (len(traced.m),))]
     for i, j in enumerate(symmetry.modes):
         pushed = jacobian * sp.Matrix(traced.fields[i])
         there = sp.Matrix(traced.fields[j]).subs(moved, simultaneous=True)
-        both = sp.lambdify(order, [*pushed, *there], modules="numpy")
-        for _ in range(5):
-            point = random.uniform(0.1, 0.9, len(order) - len(values))
-            result = np.array(both(*values.values(), *point), dtype=complex).reshape(2, -1)
-            if np.isfinite(result).all() and not np.allclose(result[0], result[1], rtol=1e-8, atol=1e-9):
+        found = numeric(traced, (*pushed, *there))([*values.values()], *point).reshape(5, 2, -1)
+        for one, other in found[np.isfinite(found).all(axis=(1, 2))]:
+            if not np.allclose(one, other, rtol=1e-8, atol=1e-9):
                 raise SystemDefinitionError(
                     f"`symmetry` does not take mode {traced.mode_names[i]!r} to {traced.mode_names[j]!r}: "
                     f"the mapped field differs from the field at the mapped state "

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.kinds import real_number
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -226,23 +227,15 @@ def phases(traced: Traced) -> NDArray[np.float64]:
 @lru_cache(maxsize=32)
 def varying_phases(traced: Traced) -> Callable[[Any], NDArray[np.float64]] | None:
     """The same as a function of the parameters' values; None where no phase depends on them."""
-    found = [-1.0 if jump.at is None else jump.at for jump in traced.transitions]
-    return _of_parameters(traced, found) if any(hasattr(at, "free_symbols") for at in found) else None
+    found = tuple(-1.0 if jump.at is None else jump.at for jump in traced.transitions)
+    if not any(hasattr(at, "free_symbols") for at in found):
+        return None
+    function = numeric(traced, found, quick=True)
+    return lambda values: np.array(function(np.asarray(values, dtype=float).tolist()))
 
 
 @lru_cache(maxsize=32)
 def phase_slopes(traced: Traced, places: tuple[int, ...]) -> Callable[[Any], NDArray[np.float64]]:
     """Derivatives (transitions, parameters) of the phases in the parameters at ``places``."""
-    symbols, phases_ = [traced.p[i] for i in places], [jump.at for jump in traced.transitions]
-    slopes = _of_parameters(
-        traced, [0 if isinstance(at, float | int | None) else at.diff(s) for at in phases_ for s in symbols]
-    )
-    return lambda values: slopes(values).reshape(len(phases_), len(places))
-
-
-def _of_parameters(traced: Traced, expressions: list[Any]) -> Callable[[Any], NDArray[np.float64]]:
-    """Expressions as a function of the parameters' values."""
-    import sympy as sp
-
-    function = sp.lambdify(traced.p, expressions, modules="math")
-    return lambda values: np.array(function(*np.asarray(values, dtype=float).tolist()), dtype=float)
+    function = numeric(traced, tuple(jump.at or 0 for jump in traced.transitions), tuple(traced.p[i] for i in places))
+    return lambda values: function(values)[:, 1:]

@@ -8,7 +8,7 @@ All are expanded, so that "is it constant?" is a question about free symbols.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +21,7 @@ from nonsmooth.system.description import Description
 from nonsmooth.system.kinds import real_number
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.domain import Domain
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import Traced, along
 
 SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
@@ -82,22 +83,15 @@ class Variant:
             return self.traced.decider.known()
         return self.traced if self.traced.patterns is None else self.traced.patterns.seen()
 
-    @cached_property
-    def period(self) -> Callable[..., float] | None:
-        """The forcing period as a function of all parameters in order."""
-        if self.traced.period is None:
-            return None
-        return sp.lambdify(self.traced.p, self.traced.period, modules="math")
-
     def period_at(
         self, now: Mapping[str, float], values: Mapping[str, float] | Sequence[float] | np.ndarray
     ) -> float | None:
         """The forcing period at other values than those of ``now``: a mapping (others stay), or all in order."""
-        if self.period is None:
+        if self.traced.period is None:
             return None
         if isinstance(values, Mapping):
             values = [values.get(key, value) for key, value in now.items()]
-        return float(self.period(*map(float, values)))
+        return float(numeric(self.traced, (self.traced.period,), quick=True)([*map(float, values)])[0])
 
     def eta(self, values: Mapping[str, float]) -> float | dict[str, float] | None:
         """Half width of the bands: None, a number, or a number for each indicator."""

@@ -6,7 +6,7 @@ It packs a system into the records of ``kernels.series``; no numerics of its own
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import ceil, log
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
 from nonsmooth.kernels.hybrid.codes import LENGTH, METHODS
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.generate import CompiledModel
@@ -258,16 +259,9 @@ def work_of(
     )
 
 
-@lru_cache(maxsize=64)
-def _period_function(traced: Traced) -> Any:
-    from sympy import lambdify
-
-    return lambdify([list(traced.p)], traced.period, "numpy")
-
-
 def periods(traced: Traced, points: FloatArray) -> FloatArray:
     """The forcing period at each point (P,); inf for an autonomous system."""
     if traced.period is None:
         return np.full(len(points), np.inf)
-    values = _period_function(traced)(list(points.T))
-    return np.full(len(points), values, dtype=float)
+    found: FloatArray = numeric(traced, (traced.period,))(points)[:, 0]
+    return found

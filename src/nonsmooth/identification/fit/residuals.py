@@ -12,6 +12,7 @@ from nonsmooth.arrays import IntArray
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.identification.fit.motion import SampledMotion
 from nonsmooth.results.labels import labels_of
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.system import System
 
 _NEAR = 1.5  # sampling steps from a transition or a graze
@@ -158,17 +159,14 @@ def _places(system: System) -> tuple[list[str], dict[tuple[str, int], int]]:
 
 def _of_samples(system: System, motion: SampledMotion, marks: Mapping[tuple[str, int], int]) -> IntArray:
     """The place of each sample of a motion: the nearest transition, a graze, else its mode."""
-    from sympy import lambdify
-
     found = np.array([marks["mode", int(m)] for m in motion.mode], np.int64)
     if len(motion.time) < 2:
         return found
     near = _NEAR * np.median(np.diff(motion.time))
     log, traced = motion.log, system.traced
-    values = system.parameter_vector()
+    u, memory = np.split(motion.z, [len(traced.u)], axis=1)
     for i in np.unique(log.touch_indicator):
-        function = lambdify([traced.t, *traced.u, *traced.m, *traced.p], traced.indicators[i], modules="numpy")
-        size = np.max(np.abs(function(motion.time, *motion.z.T, *values)))
+        size = np.abs(numeric(traced, (traced.indicators[i],))(system.parameter_vector(), motion.time, u, memory)).max()
         for t in log.touch_time[(log.touch_indicator == i) & (log.touch_clearance < _GRAZING * size)]:
             found[np.abs(motion.time - t) <= near] = marks["graze", int(i)]
     for t, k in zip(log.crossing_time, log.crossing_transition, strict=True):

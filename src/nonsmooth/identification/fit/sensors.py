@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened, unknown
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, at_least
-from nonsmooth.system.symbolic.traced import Traced
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.system import System
 
 #: What a fit may find of a sensor, as ``"x.offset"``.
@@ -130,7 +129,7 @@ class Observable:
         """Values (N,) at N samples."""
         if self.state >= 0:
             return z[:, self.state]
-        return self._evaluate(t, z, mode, p, 0)[:, 0]
+        return self._evaluate(t, z, mode, p)[:, 0]
 
     def slopes(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray) -> FloatArray:
         """Derivatives (N, n + n_active + 1) in z = (u, memory), the active parameters and the time."""
@@ -138,27 +137,17 @@ class Observable:
             out = np.zeros((len(t), z.shape[1] + len(self.places) + 1))
             out[:, self.state] = 1.0
             return out
-        return self._evaluate(t, z, mode, p, 1)
+        traced = self.system.traced
+        symbols = (*traced.u, *traced.m, *(traced.p[i] for i in self.places), traced.t)
+        return self._evaluate(t, z, mode, p, symbols)[:, 1:]
 
-    def _evaluate(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray, which: int) -> FloatArray:
-        out = np.zeros((len(t), 1 if which == 0 else z.shape[1] + len(self.places) + 1))
+    def _evaluate(
+        self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray, symbols: tuple[Any, ...] | None = None
+    ) -> FloatArray:
+        """The output (N, 1), and its derivatives in some symbols behind it."""
+        traced, out = self.system.traced, np.zeros((len(t), 1 + len(symbols or ())))
         for m in np.unique(mode):
             here = np.flatnonzero(mode == m)
-            functions = _output(self.system.traced, self.output, int(m), self.places)[which]
-            columns = (t[here], *z[here].T, *p)
-            for k, function in enumerate(functions):
-                out[here, k] = function(*columns)
+            own = numeric(traced, (traced.outputs[self.output][int(m)],), symbols)
+            out[here] = own(p, t[here], *np.split(z[here], [len(traced.u)], axis=1)).reshape(len(here), -1)
         return out
-
-
-@lru_cache(maxsize=128)
-def _output(
-    traced: Traced, output: int, mode: int, places: tuple[int, ...]
-) -> tuple[tuple[Callable[..., Any], ...], tuple[Callable[..., Any], ...]]:
-    """An output in one mode and its derivatives, of time, states, memory and parameters."""
-    from sympy import lambdify
-
-    expression, arguments = traced.outputs[output][mode], [traced.t, *traced.u, *traced.m, *traced.p]
-    symbols = [*traced.u, *traced.m, *(traced.p[i] for i in places), traced.t]
-    made = [lambdify(arguments, one, modules="numpy") for one in (expression, *(expression.diff(s) for s in symbols))]
-    return (made[0],), tuple(made[1:])

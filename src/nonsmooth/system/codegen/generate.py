@@ -189,11 +189,6 @@ def constants_of(traced: Traced) -> dict[Basic, str]:
     return {symbol: f"q{i}" for i, symbol in enumerate([*traced.p, *traced.m])}
 
 
-def scalar_code(traced: Traced, targets: Sequence[tuple[str, Expr]]) -> tuple[list[str], set[str]]:
-    """Straight code for some expressions at one point, and the functions of ``math`` that it uses."""
-    return choosing_code(traced, [targets])[1:]
-
-
 def choosing_code(
     traced: Traced, cases: Sequence[Sequence[tuple[str, Expr]]]
 ) -> tuple[dict[str, list[int]], list[str], set[str]]:

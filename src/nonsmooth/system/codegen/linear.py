@@ -19,7 +19,7 @@ import sympy
 from sympy import Expr, Symbol
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.printing import Printer, compiled
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 #: The tables of a parameter point, by the letters of what they are for: modes, n states, h harmonics, indicators,
@@ -160,11 +160,7 @@ class LinearForm:
         if again:
             targets = [(target, e) for target, e in targets if e.free_symbols]
         printer = Printer({symbol: f"p[{i}]" for i, symbol in enumerate(self.traced.p)}, arrays=True)
-        lines = assignments(targets, printer, "g") or ["pass"]
-        source = f"def fill(p, {', '.join(names)}):\n" + "".join(f"    {line}\n" for line in lines)
-        namespace: dict[str, Any] = {"np": np}
-        exec(compile(source, "<linear form>", "exec"), namespace)
-        self._fills[place, names, again] = namespace["fill"]
+        self._fills[place, names, again] = compiled(f"p, {', '.join(names)}", targets, printer)
         return self._fills[place, names, again]
 
 

@@ -3,13 +3,11 @@ r"""The equations of first variation of a traced system, as a generated module.
 Along a motion :math:`\dot u = f(t, u, p, m)` in one mode, small changes of the state, the memory and the parameters
 obey :math:`\dot X = f_u X + [0, f_m, f_p]`. The generated ``jet`` gives the Taylor coefficients of the states and of
 every entry of these Jacobians that is not zero; ``switch`` gives what a transition does to a state and all its first
-derivatives. ``touch_function`` writes an indicator, its first two Lie derivatives and their gradients as plain Python:
-they are needed one at a time.
+derivatives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -26,11 +24,9 @@ from nonsmooth.system.codegen.generate import (
     fields_of,
     function_of,
     jet_functions,
-    scalar_code,
-    unpacked,
 )
 from nonsmooth.system.codegen.jet import chain, jet_code
-from nonsmooth.system.symbolic.traced import Traced, TracedTransition, along
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 ZERO, CONSTANT, VARYING = 0, 1, 2
 FOUR = 4  # columns in a vector (``kernels.lanes``)
@@ -176,21 +172,3 @@ def _switch(traced: Traced, jump: TracedTransition, wanted: list[sp.Symbol]) -> 
         h = traced.indicators[row.indicator]
         values += [h, *(_derivative(h, s) for s in (*z, traced.t, *p))]
     return [(f"out[{i}]", e) for i, e in enumerate(values)]
-
-
-def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode: int) -> Callable[..., Any]:
-    """``f(t, u, q) -> tuple``: h, h_z, h_t, h_p, and so for L_f h and L_f^2 h, all in a row."""
-    variables = [*traced.u, *traced.m, traced.t, *(traced.p[i] for i in active)]
-    rates = [traced.indicators[indicator]]
-    for _ in range(2):
-        rates.append(along(rates[-1], traced.t, traced.u, traced.fields[mode]))
-    values = [e for one in rates for e in (one, *(one.diff(s) for s in variables))]
-    lines, used = scalar_code(traced, [(f"r{i}", e) for i, e in enumerate(values)])
-    constants = unpacked(lines)
-    result = ", ".join(f"r{i}" for i in range(len(values)))
-    body = "".join(f"    {line}\n" for line in [*constants, *lines, f"return ({result})"])
-    header = f"from math import {', '.join(sorted(used))}\n" if used else ""
-    namespace: dict[str, Any] = {}
-    exec(compile(f"{header}def touch(t, u, q):\n{body}", f"<touch {indicator} in mode {mode}>", "exec"), namespace)
-    found: Callable[..., Any] = namespace["touch"]
-    return found

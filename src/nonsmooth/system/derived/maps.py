@@ -13,10 +13,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.arguments import checked
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.tracing import call_scalar, call_vector
 from nonsmooth.system.system import System
@@ -197,7 +197,8 @@ def _point_with(system: Map, pattern: Rows) -> list[float] | None:
     """A point at which the indicators have these signs, at the present values of the parameters; None where none is."""
     traced = system.traced
     values = dict(zip(traced.p, system.parameter_vector(), strict=True))
-    rows = [sign * traced.indicators[traced.indicator_names.index(key)].subs(values) for key, sign, _ in pattern]
+    own = [sign * traced.indicators[traced.indicator_names.index(key)] for key, sign, _ in pattern]
+    rows = [row.subs(values) for row in own]
     scale = system.scale_vector()
     slopes = [[row.diff(symbol) for symbol in traced.u] for row in rows]
     if all(slope.is_number for row in slopes for slope in row):
@@ -215,9 +216,7 @@ def _point_with(system: Map, pattern: Rows) -> list[float] | None:
     random = np.random.default_rng(11)
     spread = 10.0 ** random.uniform(-3, 2, (DRAWN, 1))
     points = random.standard_normal((DRAWN, len(scale))) * spread * scale
-    with np.errstate(all="ignore"):
-        signs = [np.broadcast_to(sp.lambdify(traced.u, row, "numpy")(*points.T), DRAWN) > 0 for row in rows]
-    inside = np.flatnonzero(np.all(signs, axis=0))
+    inside = np.flatnonzero((numeric(traced, tuple(own))(system.parameter_vector(), u=points) > 0).all(axis=1))
     return points[inside[0]].tolist() if len(inside) else None
 
 

@@ -28,7 +28,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy as sp
@@ -37,6 +37,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.derived.sticking import Additions
 from nonsmooth.system.equations import TracedSurface
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.scalar import as_written
 from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Traced, TracedCondition, TracedTransition, along
 
@@ -66,12 +67,11 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
 
 
 @lru_cache(maxsize=256)
-def _both_rates(traced: Traced, surface: TracedSurface, scale: tuple[float, ...]) -> Callable[..., Any]:
-    """Function of t, u, m, p: the indicator, its size, its rates below and above."""
+def _both_rates(traced: Traced, surface: TracedSurface, scale: tuple[float, ...]) -> Callable[..., FloatArray]:
+    """Function of p, t, u, m: the indicator, its size, its rates below and above."""
     build = _SlidingModes(traced, dict(zip(traced.state_names, scale, strict=True)))
     rates = (build.rate(surface, mode) for mode in (surface.below, surface.above))
-    found = [traced.indicators[surface.indicator], build.size(surface), *rates]
-    return sp.lambdify([traced.t, list(traced.u), list(traced.m), list(traced.p)], found, modules="numpy")
+    return numeric(traced, (traced.indicators[surface.indicator], build.size(surface), *rates))
 
 
 def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
@@ -80,10 +80,8 @@ def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
     traced, scale = system.declared, tuple(system.scale.values())
     for surface in system.surfaces:
         both = _both_rates(traced, surface, scale)
-        with np.errstate(all="ignore"):
-            h, size, below, above = both(0.0, list(states.T), system.memory_vector(), system.parameter_vector())
-            found = (np.abs(h) <= ON_SURFACE * size) & (np.asarray(below) < 0) & (np.asarray(above) > 0)
-        found = np.broadcast_to(found, len(states))
+        h, size, below, above = both(system.parameter_vector(), 0.0, states, system.memory_vector()).T
+        found = (np.abs(h) <= ON_SURFACE * size) & (below < 0) & (above > 0)
         if found.any():
             return traced.indicator_names[surface.indicator], int(np.argmax(found))
     return None
@@ -162,7 +160,7 @@ class _SlidingModes(Additions):
             found.setdefault(key, []).append((pair, field, shown))
         for (cell, held), ways in found.items():
             first, field, shown = ways[0]
-            if not all(_agree(field, other) for _, other, _ in ways[1:]):
+            if not all(_agree(self.traced, field, other) for _, other, _ in ways[1:]):
                 continue
             name = first.mode or "_".join(self.indicator_names[i] for i in sorted(held)) + "_sliding"
             if name in self.modes:
@@ -311,13 +309,8 @@ class _SlidingModes(Additions):
         return replace(first, source=slid, target=target, label=label, contact=first.reset is not None)
 
 
-def _agree(one: Field, two: Field) -> bool:
+def _agree(traced: Traced, one: Field, two: Field) -> bool:
     """Return whether two vector fields are the same, by their values at fixed pseudo-random points."""
-    symbols = sorted(set().union(*(entry.free_symbols for entry in (*one, *two))), key=str)
-    both = sp.lambdify(symbols, [*one, *two], modules="numpy")
-    random = np.random.default_rng(11)
-    for _ in range(SEEDS):
-        values = np.array(both(*random.uniform(0.5, 1.5, len(symbols))), dtype=float).reshape(2, -1)
-        if not np.allclose(values[0], values[1], rtol=1e-9, atol=1e-9):
-            return False
-    return True
+    random, sizes = np.random.default_rng(11), ((len(traced.p),), (), (len(traced.u),), (len(traced.m),))
+    both = numeric(traced, (*one, *two))(*(random.uniform(0.5, 1.5, (SEEDS, *size)) for size in sizes))
+    return np.allclose(both[:, : len(one)], both[:, len(one) :], rtol=1e-9, atol=1e-9)

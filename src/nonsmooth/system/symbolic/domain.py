@@ -9,7 +9,6 @@ of one another. Anything else needs ``period=``, which is checked against the eq
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
@@ -19,6 +18,7 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import Traced
 
 
@@ -86,27 +86,24 @@ def _collect(e: sp.Expr, t: sp.Symbol, values: Mapping[sp.Symbol, float], found:
 
 
 def check_period(
-    expressions: Mapping[str, sp.Expr], t: sp.Symbol, others: Mapping[sp.Symbol, float], period: float, given: str
+    traced: Traced, expressions: Mapping[str, sp.Expr], values: Sequence[float], period: float, given: str
 ) -> None:
     """Raise unless every expression, by what it is, repeats after the ``period`` that was ``given``: numerically, at
-    the parameters ``others`` and fixed pseudo-random states and memory."""
+    these parameters and fixed pseudo-random states and memory."""
     random = np.random.default_rng(5)
+    t = random.uniform(0, 3 * period, 7)
+    u, m = (random.uniform(0.1, 0.9, (7, len(some))) for some in (traced.u, traced.m))
     for what, expression in expressions.items():
-        if t not in expression.free_symbols:
+        if traced.t not in expression.free_symbols:
             continue
-        free = sorted(expression.free_symbols - {t} - others.keys(), key=str)
-        order = [t, *free, *others]
-        function = sp.lambdify(order, expression, modules="numpy")
-        for instant in random.uniform(0, 3 * period, 7):
-            # NumPy's numbers: a power that is too large for Python's floats is an exception
-            values = np.array([*random.uniform(0.1, 0.9, len(free)), *others.values()])
-            with np.errstate(all="ignore"):
-                now, later = (complex(function(time, *values)) for time in (instant, instant + period))
-            if np.isfinite(now) and abs(later - now) > 1e-7 * (1 + abs(now)):
-                raise SystemDefinitionError(
-                    f"{what} does not repeat after the period {given} = {period:.12g}: "
-                    f"{now.real:.9g} at t = {instant:.6g}, {later.real:.9g} one period later"
-                )
+        now, later = (numeric(traced, (expression,))(values, time, u, m)[:, 0] for time in (t, t + period))
+        with np.errstate(all="ignore"):
+            off = np.isfinite(now) & (np.abs(later - now) > 1e-7 * (1 + np.abs(now)))
+        for i in np.flatnonzero(off):
+            raise SystemDefinitionError(
+                f"{what} does not repeat after the period {given} = {period:.12g}: "
+                f"{now[i]:.9g} at t = {t[i]:.6g}, {later[i]:.9g} one period later"
+            )
 
 
 #: Of each kind of rule, which finite numbers it allows, and the sentence on another.
@@ -136,18 +133,12 @@ class _Rule:
         self.used = [name for symbol, name in known if symbol in expression.free_symbols]
 
     @cached_property
-    def _scalar(self) -> Any:
-        return sp.lambdify(self.traced.p, self.expression, modules="math")
-
-    @cached_property
-    def of_rows(self) -> Any:
-        return sp.lambdify(self.traced.p, self.expression, modules="numpy")
+    def of(self) -> Callable[[Any], Any]:
+        """The expression at rows of values, (P, 1)."""
+        return numeric(self.traced, (self.expression,))
 
     def check(self, values: Mapping[str, float]) -> None:
-        try:
-            number = float(self._scalar(*(values[name] for name in self.traced.parameter_names)))
-        except (ArithmeticError, ValueError, TypeError):
-            number = math.nan
+        (number,) = self.of([values[name] for name in self.traced.parameter_names])
         if not self.allows(number):
             given = ", ".join(f"{name} = {values[name]!r}" for name in self.used)
             text = self.expression.subs({s: sp.Symbol(n) for s, n in self.traced.named().items()})
@@ -209,10 +200,9 @@ class Domain:
             if (points[:, self._names.index(name)] == 0).any():
                 raise SystemDefinitionError(self._by_zero(name))
         for rule in self._rules:
-            with np.errstate(all="ignore"):
-                refused = ~np.broadcast_to(rule.allows(rule.of_rows(*points.T)), len(points))
-            if refused.any():
-                rule.check(dict(zip(self._names, points[refused][0].tolist(), strict=True)))
+            allowed = rule.allows(rule.of(points)[:, 0])
+            if not allowed.all():
+                rule.check(dict(zip(self._names, points[~allowed][0].tolist(), strict=True)))
 
 
 def _restricted(expression: sp.Expr, parameters: set[sp.Symbol]) -> Iterator[tuple[sp.Expr, str]]:

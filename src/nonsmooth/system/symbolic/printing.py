@@ -1,8 +1,7 @@
 """SymPy expressions as lines of Python: scalar code for Numba, or array code for NumPy.
 
-SymPy's own printers write a double with 15 digits (most doubles change), and ``lambdify`` hides what is shared
-between expressions. Here every double is its ``repr``, integers and rationals become doubles, and a
-subexpression that occurs twice is computed once.
+SymPy's own printers, and so ``lambdify``, write a double with 15 digits (most doubles change). Here every double is
+its ``repr``, integers and rationals become doubles, and a subexpression that occurs twice is computed once.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import numpy as np
 import sympy
 from sympy import Basic, Expr
 from sympy.logic.boolalg import Boolean, BooleanFalse, BooleanTrue
@@ -209,6 +209,15 @@ def assignments(targets: Iterable[tuple[str, Basic]], printer: Printer, prefix: 
     targets = list(targets)
     lines = shared_terms([expression for _, expression in targets], printer, prefix)
     return lines + [f"{left} = {printer(expression)}" for left, expression in targets]
+
+
+def compiled(head: str, targets: Iterable[tuple[str, Basic]], printer: Printer) -> Callable[..., Any]:
+    """The function with the arguments ``head`` that gives targets the values of expressions."""
+    lines = assignments(targets, printer, "g") or ["pass"]
+    scope: dict[str, Any] = {"np": np} if printer.arrays else dict(vars(math))
+    exec(compile("\n    ".join([f"def f({head}):", *lines]), "<expressions>", "exec"), scope)
+    found: Callable[..., Any] = scope["f"]
+    return found
 
 
 def shared_terms(
