@@ -123,8 +123,8 @@ class Case:
         """Phi and P put together with saltation as the two functions of a jump give it."""
         legs = self.variation.segments
         phi, p = legs.Phi[0], legs.P[0]
-        if self.variation.start is not None:
-            phi, p = phi @ self.variation.start.R_z, p + phi @ self.variation.start.R_p
+        if (start := self.variation.start) is not None:
+            phi, p = phi @ start.R_z, p + phi @ start.R[: start.n, start.n :]
         for i, jump in enumerate(self.variation.jumps, start=1):
             s = matrix(jump)
             phi, p = legs.Phi[i] @ (s @ phi), legs.Phi[i] @ (s @ p + column(jump)) + legs.P[i]
@@ -161,7 +161,7 @@ def saltation(jump: Jump) -> np.ndarray:
 
 
 def column(jump: Jump) -> np.ndarray:
-    return jump.parameter_column
+    return jump.S[: jump.n, jump.n :]
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
@@ -183,8 +183,8 @@ BROKEN = {
     "sign": (lambda jump: 2 * jump.R_z - jump.saltation, column),
     "omitted": (lambda jump: jump.R_z, column),
     "identity": (lambda jump: np.eye(len(jump.z_after)), column),
-    "parameters omitted": (saltation, lambda jump: 0.0 * jump.parameter_column),
-    "parameters' sign": (saltation, lambda jump: 2 * jump.R_p - jump.parameter_column),
+    "parameters omitted": (saltation, lambda jump: 0.0 * jump.S[: jump.n, jump.n :]),
+    "parameters' sign": (saltation, lambda jump: 2 * jump.R[: jump.n, jump.n :] - jump.S[: jump.n, jump.n :]),
 }
 
 
@@ -325,8 +325,8 @@ def test_saltation_of_the_papers_oscillator() -> None:
     assert entry.indicator == 0 and entry.transversality > 0.05
     assert np.abs(entry.saltation - [[1.0, 0.0], [-v["c_s"] / v["m"], 1.0]]).max() < 3e-14
     # a later gap delays the entry by dg / v, and the push by as much
-    assert np.abs(entry.parameter_column[:, 0] - [0.0, v["c_s"] / v["m"]]).max() < 3e-14
-    assert abs(entry.t_p[0] - 1 / 0.05) < 1e-12
+    assert np.abs(entry.S[: entry.n, entry.n] - [0.0, v["c_s"] / v["m"]]).max() < 3e-14
+    assert abs(entry.instant[entry.n] - 1 / 0.05) < 1e-12
     release = flow.jump(values, 1, 0.3, [v["g"] + v["c_s"] / v["k_s"] * 0.05, -0.05])
     assert abs(release.h) < 1e-18 and np.abs(release.saltation - np.eye(2)).max() < 1e-12
     other = flow.jump(values, 0, 0.3, [v["g"] + 1e-5, -v["k_s"] / v["c_s"] * 1e-5])
@@ -347,7 +347,7 @@ def test_stick_has_a_singular_saltation_matrix() -> None:
     # at equal times: x has moved at b on both sides, v is b
     assert np.abs(jump.saltation - [[1.0, 0.0], [0.0, 0.0]]).max() < 1e-15
     assert jump.log_determinant == -np.inf
-    assert np.abs(jump.parameter_column[:, 0] - [0.0, 1.0]).max() < 1e-15
+    assert np.abs(jump.S[: jump.n, jump.n] - [0.0, 1.0]).max() < 1e-15
     run = sensitivity(system, duration=2.0, start={"x": -1.0, "v": 0.0})
     assert run.log_det == -np.inf and run.trace_defect == 0.0 and len(run.crossing) == 1
 

@@ -24,7 +24,7 @@ CORNERS = (
     sp.Max(X, Y, B) - sp.Min(X * Y, A),
     sp.Piecewise((X**2, (X > 0) & (Y > 0)), (Y / 3, sp.Or(X < -1, sp.Eq(Y, 2))), (T, True)),
     sp.Heaviside(X, sp.Rational(1, 4)) * 3 - sp.Heaviside(-X, 0),
-    sp.floor(3 * X) + sp.ceiling(Y) + sp.Mod(X, 3),
+    sp.floor(3 * X) + sp.ceiling(Y) + (X - 3 * sp.floor(X / 3)),
     sp.Piecewise((0, X < 0), (1, True)) + sp.Piecewise((sp.sqrt(X), X >= 0), (0, True)),
     sp.Piecewise((1, sp.Not(X > Y)), (2, X > 100), (sp.Abs(Y) ** A, True)),
 )

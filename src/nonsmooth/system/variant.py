@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError, shortened, unknown
+from nonsmooth.errors import shortened, unknown
 from nonsmooth.system.description import Description
 from nonsmooth.system.kinds import real_number
 from nonsmooth.system.parameter import Parameter
@@ -100,14 +100,6 @@ class Variant:
         if self.kind == ONE_ETA:
             return values["eta"]
         return {str(indicator): values[key] for key, indicator in self.etas}
-
-    def refuse_patterns(self, verb: str) -> None:
-        """Raise SystemDefinitionError where the modes are made when they are first visited."""
-        if self.traced.patterns is not None:
-            raise SystemDefinitionError(
-                f"{self.name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it. "
-                f"Not so for {verb}: take fewer elements for it"
-            )
 
     def changed(self, values: Mapping[str, float], given: Any, named: Mapping[str, float]) -> dict[str, float]:
         """The values with some changed: ``given`` is a mapping or has a mapping ``values``; ``named`` wins over it."""

@@ -177,20 +177,16 @@ def module_of(engine: SeriesEngine, tables: SeriesPoints) -> Any:
         "N_SCRATCH_ROWS": engine.model.n_scratch,
     }
     arrays = {
-        "TRANSITIONS": _filled(net.transitions, (1, 3)),
+        "TRANSITIONS": _not_empty(net.transitions),
         "ROWS": net.rows,
         "ROW_START": net.row_start,
         "MODE_START": net.mode_start,
-        "MODE_LIST": _filled(net.mode_list, (1,)),
+        "MODE_LIST": _not_empty(net.mode_list),
         "AT": net.at if len(net.at) else np.full(1, -1.0),
         "LACKING": engine.lacking,
         "KINDS": engine.kinds,
     }
     return cuda_series_module(cuda_series_source(model_source(engine.layers.model), sizes, arrays))
-
-
-def _filled(array: Any, shape: tuple[int, ...]) -> Any:
-    return array if array.size else np.zeros(shape, dtype=array.dtype)
 
 
 class SeriesOnGpu(OnGpu):

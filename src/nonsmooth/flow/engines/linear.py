@@ -73,41 +73,15 @@ class LinearEngine(Engine):
         return float(system[2].info[mode, 0])
 
     def prepare(self, points: FloatArray) -> LinearPoints:
-        t = self.form.evaluate(points)
-        n_points, n_modes = t.b.shape[:2]
-        n_i, n_h = t.ia.shape[1], len(self.form.multiples)
-        multiples = np.array(self.form.multiples, dtype=np.int64)
         from nonsmooth.kernels.compile.cache import compiled
-        from nonsmooth.kernels.hybrid.records import Form
 
-        lacking = np.hstack([self.lacking, np.ones((n_modes, len(self.traced.m)), dtype=np.int64)])
-        form = Form(
-            t.A,
-            t.b,
-            t.c,
-            t.s,
-            multiples,
-            t.omega,
-            t.period,
-            t.ia,
-            t.ib,
-            t.ic,
-            t.is_,
-            t.oa,
-            t.ob,
-            t.oc,
-            t.os,
-            t.ra,
-            t.rb,
-            t.rc,
-            t.rs,
-            lacking,
-        )
-        if self.is_planar and n_h == 0:  # a forcing of no size
+        form = self.form.evaluate(points)
+        sizes = form.b.shape[1], form.ia.shape[1], form.oa.shape[1], len(self.net.rows)
+        if self.is_planar and not len(form.multiples):  # a forcing of no size
             form = _with_harmonic(form)
-        if n_points > 1:  # threads may share them
+        if len(points) > 1:  # threads may share them
             compiled(self.module().run)
-        return LinearPoints(points, form, form.period, (n_modes, n_i, t.oa.shape[1], len(self.net.rows)))
+        return LinearPoints(points, form, form.period, sizes)
 
     @property
     def is_planar(self) -> bool:

@@ -22,7 +22,7 @@ from nonsmooth.system.derived.patterns import Lead, Reset
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, FOUND, TOGETHER
 
 if TYPE_CHECKING:
-    from nonsmooth.system.codegen.linear import LinearTables
+    from nonsmooth.kernels.hybrid.records import Form
     from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.patterns import Patterns
 
@@ -35,7 +35,7 @@ class Points:
     """Parameter points, and for each thread the tables of the one that it is at."""
 
     points: FloatArray
-    linear: LinearTables
+    linear: Form
     period: FloatArray
     local: threading.local = field(default_factory=threading.local)
 
@@ -53,7 +53,7 @@ class PatternTables:
         self.stand = linear_module().stand
         self.points, self.period = tables.points[i : i + 1], tables.period[i : i + 1]
         self.omega = np.ascontiguousarray(tables.linear.omega[i : i + 1])
-        self.multiples = np.array(patterns.form.multiples, dtype=np.int64)
+        self.multiples = tables.linear.multiples
         self.own_outputs = self._outputs(tables.linear, i)
         self.index: dict[Pattern, int] = {}
         self.numbers: list[int] = []  # of the patterns here among all that were visited
@@ -76,7 +76,7 @@ class PatternTables:
         self.capacity = 0
         self.add(patterns.visited[0])
 
-    def _outputs(self, linear: LinearTables, i: int) -> FloatArray:
+    def _outputs(self, linear: Form, i: int) -> FloatArray:
         """The user's own outputs as rows."""
         found = np.zeros((linear.oa.shape[1], self.rows.field.shape[1]))
         put_together(found, self.rows.n, linear.oa[i, :, 0], linear.ob[i, :, 0], linear.oc[i, :, 0], linear.os[i, :, 0])

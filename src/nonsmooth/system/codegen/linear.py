@@ -10,9 +10,8 @@ apart, once per system; the matrices of any number of parameter points then come
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy
@@ -21,6 +20,9 @@ from sympy import Expr, Symbol
 from nonsmooth.arrays import FloatArray
 from nonsmooth.system.symbolic.printing import Printer, compiled
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
+
+if TYPE_CHECKING:
+    from nonsmooth.kernels.hybrid.records import Form
 
 #: The tables of a parameter point, by the letters of what they are for: modes, n states, h harmonics, indicators,
 #: outputs and resets.
@@ -44,40 +46,6 @@ SHAPES = {
     "rs": "rhn",
 }
 Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> coefficient in the parameters
-
-
-@dataclass(frozen=True)
-class LinearTables:
-    """Matrices for P parameter points, M modes, n states with the memory behind them, H harmonics, I indicators, O
-    outputs, T transitions.
-
-    Names: ``?b`` the constant part, ``?c`` and ``?s`` the cosines' and sines' coefficients. Where the form says
-    that indicators, outputs or resets are not affine, their arrays are zero (identity for ``ra``).
-    """
-
-    omega: FloatArray  # (P,) base frequency 2 pi / period; 0 for an autonomous system
-    A: FloatArray  # (P, M, n, n)
-    b: FloatArray  # (P, M, n)
-    c: FloatArray  # (P, M, H, n)
-    s: FloatArray  # (P, M, H, n)
-    ia: FloatArray  # (P, I, n)
-    ib: FloatArray  # (P, I)
-    ic: FloatArray  # (P, I, H)
-    is_: FloatArray  # (P, I, H)
-    oa: FloatArray  # (P, O, M, n)
-    ob: FloatArray  # (P, O, M)
-    oc: FloatArray  # (P, O, M, H)
-    os: FloatArray  # (P, O, M, H)
-    ra: FloatArray  # (P, T, n, n)
-    rb: FloatArray  # (P, T, n)
-    rc: FloatArray  # (P, T, H, n)
-    rs: FloatArray  # (P, T, H, n)
-
-    @property
-    def period(self) -> FloatArray:
-        """Forcing periods, (P,); infinite for an autonomous system."""
-        with np.errstate(divide="ignore"):
-            return np.where(self.omega > 0.0, 2.0 * np.pi / self.omega, np.inf)
 
 
 class LinearForm:
@@ -114,11 +82,15 @@ class LinearForm:
     def multiples(self) -> tuple[int, ...]:
         return tuple(sorted({k for _, _, k, _ in self._entries if k}))
 
-    def evaluate(self, points: FloatArray, place: int | None = None) -> LinearTables:
+    def evaluate(self, points: FloatArray, place: int | None = None) -> Form:
         """All matrices at points (P, n_parameters), not finite where a formula is not (a division by a zero parameter).
+        Memory stands behind the states; where indicators, outputs or resets are not affine, theirs are zero (of resets
+        the identity).
 
         With ``place`` the derivatives of all entries in that parameter, at fixed states and time (``omega``: of the
         frequency)."""
+        from nonsmooth.kernels.hybrid.records import Form
+
         points = np.asarray(points, dtype=np.float64)
         t = self.traced
         sizes = {
@@ -133,12 +105,16 @@ class LinearForm:
         tables = {name: np.zeros((len(points), *shape)) for name, shape in shapes.items()}
         with np.errstate(all="ignore"):
             self._filler(place, tuple(tables))(np.ascontiguousarray(points.T), **tables)
-        return LinearTables(**tables)
+            period = np.where(tables["omega"] > 0.0, 2.0 * np.pi / tables["omega"], np.inf)
+        lacking = np.ones((sizes["m"], sizes["n"]), dtype=np.int64)  # memory is no state of a mode
+        lacking[:, : len(t.u)] = np.reshape(t.lacking, (-1, len(t.u)))
+        multiples = np.array(self.multiples, dtype=np.int64)
+        return Form(**tables, multiples=multiples, period=period, lacking=lacking)
 
     def fill(self, values: FloatArray, place: int | None, tables: dict[str, FloatArray], again: bool = False) -> None:
         """Write the entries that are not zero, or their derivatives in one parameter, into tables for one point.
 
-        Those of ``LinearTables`` that are not given are left out; ``again``: entries that are constants stand there."""
+        Those of ``SHAPES`` that are not given are left out; ``again``: entries that are constants stand there."""
         with np.errstate(all="ignore"):
             self._filler(place, tuple(tables), again)(values[:, None], **tables)
 

@@ -18,6 +18,7 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.codegen.linear import SHAPES
 from nonsmooth.system.derived.assembly import Pattern
 from nonsmooth.system.derived.elements.element import THROWN
 from nonsmooth.system.derived.rows import Row, Rows
@@ -272,12 +273,13 @@ class Patterns:
     def _made(self, point: FloatArray, place: int | None) -> Rows:
         tables = self.form.evaluate(point)
         if place is not None:
-            slopes = vars(self.form.evaluate(point, place))
-            tables = replace(tables, **{name: one + 1j * STEP * slopes[name] for name, one in vars(tables).items()})
-        still = [one.tobytes() for name, one in vars(tables).items() if name != "omega"]
+            slopes = self.form.evaluate(point, place)
+            both = {name: (getattr(tables, name), getattr(slopes, name)) for name in SHAPES}
+            tables = tables._replace(**{name: one + 1j * STEP * slope for name, (one, slope) in both.items()})
+        still = [getattr(tables, name).tobytes() for name in SHAPES if name != "omega"]
         for like in self._local.rows.values():
             if like.still == still and not like.turned:
-                return like.at_rates(tables.omega[0] * np.array(self.form.multiples, dtype=float))
+                return like.at_rates(tables.omega[0] * tables.multiples)
         return Rows(self, tables, still)
 
     def number(self, pattern: Pattern) -> int:

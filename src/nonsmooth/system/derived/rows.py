@@ -23,7 +23,7 @@ from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingE
 from nonsmooth.system.derived.faces import linked
 
 if TYPE_CHECKING:
-    from nonsmooth.system.codegen.linear import LinearTables
+    from nonsmooth.kernels.hybrid.records import Form
     from nonsmooth.system.derived.patterns import Patterns
 
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
@@ -84,9 +84,9 @@ class Rows(Assembler):
 
     With complex numbers it is that of derivatives in a parameter, too (:meth:`Patterns.rows_at`)."""
 
-    def __init__(self, patterns: Patterns, tables: LinearTables, still: list[bytes]) -> None:
+    def __init__(self, patterns: Patterns, tables: Form, still: list[bytes]) -> None:
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
-        self.rates = tables.omega[0] * np.array(patterns.form.multiples, dtype=float)
+        self.rates = tables.omega[0] * tables.multiples
         self.scale, self.asks, self.mode = patterns.scale, True, patterns.mode
         self.sequential, self.inputs = patterns.make.sequential, patterns.make.inputs
         self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics), dtype=tables.A.dtype)

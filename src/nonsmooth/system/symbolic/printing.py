@@ -47,7 +47,6 @@ CORNERS = (
     sympy.Piecewise,
     sympy.floor,
     sympy.ceiling,
-    sympy.Mod,
 )
 RELATIONS: dict[type, str] = {
     sympy.Gt: ">",
@@ -116,9 +115,6 @@ class Printer:
             if self.arrays:
                 return f"np.heaviside({x}, {middle})", True
             return f"(1.0 if {x} > 0.0 else (0.0 if {x} < 0.0 else {middle}))", True
-        if isinstance(e, sympy.Mod):
-            a, b = (self._atom(x) for x in e.args)
-            return f"({a} % {b})", True
         raise SystemDefinitionError(
             f"no code can be written for {e} ({type(e).__name__}); allowed are + - * / **, abs, sign, maximum, "
             f"minimum, where, heaviside and {', '.join(names[1] for names in FUNCTIONS.values())}"
