@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from nonsmooth.flow.simulate import with_crossings
@@ -9,17 +11,15 @@ from nonsmooth.flow.simulate import with_crossings
 
 def merged(crossing: list[float], before: list[float], after: list[float], samples: list[float], segment: list[int]):
     n, count = len(samples), len(crossing)
-    return with_crossings(
-        np.array(samples),
-        np.array(samples)[:, None],
-        np.array(segment) % 2,
-        np.array(segment),
-        np.array(crossing),
-        np.array(before)[:, None],
-        np.array(after)[:, None],
-        np.arange(count) % 2,
-        (np.arange(count) + 1) % 2,
-    ), n
+    log = SimpleNamespace(
+        sample_u=np.array(samples)[:, None],
+        sample_mode=np.array(segment) % 2,
+        sample_segment=np.array(segment),
+        crossing_time=np.array(crossing),
+        u_before=np.array(before)[:, None],
+        u_after=np.array(after)[:, None],
+    )
+    return with_crossings(np.array(samples), log, np.arange(count) % 2, (np.arange(count) + 1) % 2), n
 
 
 def test_each_crossing_stands_twice_between_the_samples() -> None:
@@ -39,17 +39,6 @@ def test_a_sample_at_a_crossing_and_a_chain_at_one_instant_keep_their_order() ->
 
 
 def test_without_crossings_the_samples_are_unchanged() -> None:
-    empty = np.empty(0)
-    result = with_crossings(
-        np.arange(3.0),
-        np.zeros((3, 2)),
-        np.zeros(3, int),
-        np.zeros(3, int),
-        empty,
-        np.empty((0, 2)),
-        np.empty((0, 2)),
-        empty,
-        empty,
-    )
+    result, _ = merged([], [], [], [0.0, 1.0, 2.0], [0, 0, 0])
     np.testing.assert_array_equal(result.time, [0, 1, 2])
-    assert result.u.shape == (3, 2)
+    assert result.u.shape == (3, 1)

@@ -36,6 +36,9 @@ TIMES = 64  # of a forcing period, at which conditions are asked
 INSTANTS = np.array([0.0, 0.137, 0.262, 0.419, 0.548, 0.683, 0.811, 0.943])  # and at which a field must vanish
 
 
+Bound = tuple[FloatArray, float, tuple[int, int]]  # slopes, room and key of a condition: slopes @ z <= room
+
+
 class LinearCondition(NamedTuple):
     """``sign * indicator > 0`` beside a state: ``slopes @ (u - there)`` and its greatest and least value there."""
 
@@ -108,7 +111,7 @@ def equilibrium_sets(
     for mode in modes or ():
         timed = any(jump.at is not None and jump.source == mode for jump in traced.transitions)
         if not timed and not traced.mode_names[mode].endswith(NOT_UNIQUE):
-            parts += _polytopes(system, mode, near, values, memory)
+            parts += _ModeAt(system, mode, values, memory).polytopes(near)
     return _joined(parts)
 
 
@@ -121,55 +124,14 @@ def modes_of_sets(system: System) -> tuple[int, ...]:
 def _modes_of_sets(system: System, patterns: Any) -> tuple[int, ...]:
     """The same; equal systems whose modes are made when visited number them in orders of their own."""
     u, values, memory = np.zeros(len(system.states)), system.parameter_vector(), system.memory_vector()
-    found, scale = [], system.scale_vector()
+    found = []
     for mode in every_mode(system.traced, values) or ():
-        field = mode_field(system.traced, mode)
-        if not field.affine:
+        here = _ModeAt(system, mode, values, memory)
+        if not here.field.affine:
             return ()
-        if field.own and _free(_equations(system, mode, u, values, memory)[0] * scale[field.own]).size:
+        if here.field.own and _free(here.equations(u)[0] * here.own).size:
             found.append(mode)
     return tuple(found)
-
-
-def _equations(
-    system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Linear equations ``matrix @ step = right`` of a mode beside a state, at some times of a forcing period."""
-    traced, field = system.traced, mode_field(system.traced, mode)
-    period = system.period_at(values)
-    times = np.zeros(1) if period is None else period * INSTANTS
-    f, J, _ = field.evaluate(u, values, memory, times)
-    matrix, right = [*J], [*-f]
-    held = held_places(traced, mode, values)
-    if held is not None:  # a field holds what is independent: of the others too nothing moves
-        rows, kept = held
-        for one in kept:
-            matrix += [one[:, field.own]] * len(times)
-            right += [-one @ rows.augmented(u, t) for t in times]
-    return np.vstack(matrix), np.concatenate(right)
-
-
-def _conditions(
-    system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray
-) -> list[list[LinearCondition]]:
-    """The conditions of each way out of a mode, beside a state."""
-    traced, field, period = system.traced, mode_field(system.traced, mode), system.period_at(values)
-    h, h_u = field.indicators(u, values, memory)
-    size, slopes = np.abs(h_u) @ (system.scale_vector() + np.abs(u)), h_u[:, field.own]
-    both = np.array([h, h])
-    if period is not None:
-        at = field.indicators(u, values, memory, np.linspace(0.0, period, TIMES + 1)[:-1])[0]
-        both = np.array([-_peaks(-at), _peaks(at)])
-    return [
-        [
-            LinearCondition(
-                (i, sign), sign * slopes[i], float((sign * both[:, i]).max()), float((sign * both[:, i]).min()), size[i]
-            )
-            for i, sign in ((row.indicator, row.sign) for row in jump.rows)
-        ]
-        for jump in traced.transitions
-        if jump.source == mode and jump.rows and jump.fires
-    ]
 
 
 def _peaks(at: FloatArray) -> FloatArray:
@@ -207,89 +169,125 @@ class _Faces:
         return self.origin + self.ways @ z, tuple(self.keys[i] for i in chosen)
 
 
-def _polytopes(system: System, mode: int, near: FloatArray, values: FloatArray, memory: FloatArray) -> list[Polytope]:
-    """The equilibria of one mode: one polytope for each choice of the conditions that do not hold."""
-    scale, affine = system.scale_vector(), mode_field(system.traced, mode).affine
-    found = []
-    for which, faces in enumerate(_faces(system, mode, near, values, memory)):
-        n, d = faces.ways.shape
-        extremes = [] if d else [Extreme(faces.origin * scale, mode)]
-        lower, upper = faces.origin * scale, faces.origin * scale
-        for k, sign in product(range(n), (-1, 1)) if d else ():
-            if np.abs(faces.ways[k]).max() <= FREE:
-                continue
-            here, last = faces, None
-            for _ in range(MOST):
-                vertex = here.farthest(sign * np.eye(n)[k])
-                if vertex is None or not np.isfinite(vertex[0]).all() or affine:
-                    break
-                if last is not None and np.abs(vertex[0] - last).max() <= VANISHING:
-                    break
-                last = vertex[0]
-                again = _faces(system, mode, last * scale, values, memory)
-                if which >= len(again):
-                    vertex = None
-                    break
-                here = again[which]
-            if vertex is None:
-                break
-            u, keys = vertex
-            (upper if sign > 0 else lower)[k] = u[k] * scale[k] * (1.0 if np.isfinite(u[k]) else sign)
-            if np.isfinite(u).all():
-                extremes.append(Extreme(u * scale, mode, (k, sign), keys))
-        else:
-            bounds = faces.origin, faces.ways, faces.slopes, faces.room
-            found.append(Polytope(mode, scale, *bounds, lower, upper, tuple(extremes), faces.edge))
-    return found
+class _ModeAt:
+    """A mode at given parameters and memory, whose equilibria are wanted."""
 
+    def __init__(self, system: System, mode: int, values: FloatArray, memory: FloatArray) -> None:
+        self.traced, self.mode, self.at, self.period = system.traced, mode, (values, memory), system.period_at(values)
+        self.field, self.scale = mode_field(system.traced, mode), system.scale_vector()
+        self.own = self.scale[self.field.own]
 
-def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray) -> list[_Faces]:
-    """The bounds of the equilibria of a mode next to a state, found by Newton's method; empty: there are none."""
-    scale, lacking = system.scale_vector(), np.array(system.traced.lacking[mode], dtype=bool)
-    own, u = scale[~lacking], np.where(lacking, 0.0, u)
-    if not len(own):
-        return []
-    for _ in range(MOST):
-        matrix, right = _equations(system, mode, u, values, memory)
-        if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+    def equations(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Linear equations ``matrix @ step = right`` beside a state, at some times of a forcing period."""
+        times = np.zeros(1) if self.period is None else self.period * INSTANTS
+        f, J, _ = self.field.evaluate(u, *self.at, times)
+        matrix, right = [*J], [*-f]
+        held = held_places(self.traced, self.mode, self.at[0])
+        if held is not None:  # a field holds what is independent: of the others too nothing moves
+            rows, kept = held
+            for one in kept:
+                matrix += [one[:, self.field.own]] * len(times)
+                right += [-one @ rows.augmented(u, t) for t in times]
+        return np.vstack(matrix), np.concatenate(right)
+
+    def conditions(self, u: FloatArray) -> list[list[LinearCondition]]:
+        """The conditions of each way out, beside a state."""
+        h, h_u = self.field.indicators(u, *self.at)
+        size, slopes = np.abs(h_u) @ (self.scale + np.abs(u)), h_u[:, self.field.own]
+        both = np.array([h, h])
+        if self.period is not None:
+            at = self.field.indicators(u, *self.at, np.linspace(0.0, self.period, TIMES + 1)[:-1])[0]
+            both = np.array([-_peaks(-at), _peaks(at)])
+        return [
+            [
+                LinearCondition((i, sign), sign * slopes[i], float(here.max()), float(here.min()), size[i])
+                for i, sign, here in ((row.indicator, row.sign, row.sign * both[:, row.indicator]) for row in jump.rows)
+            ]
+            for jump in self.traced.transitions
+            if jump.source == self.mode and jump.rows and jump.fires
+        ]
+
+    def polytopes(self, near: FloatArray) -> list[Polytope]:
+        """The equilibria: one polytope for each choice of the conditions that do not hold."""
+        scale, mode, found = self.scale, self.mode, []
+        for which, faces in enumerate(self.faces(near)):
+            n, d = faces.ways.shape
+            extremes = [] if d else [Extreme(faces.origin * scale, mode)]
+            lower, upper = faces.origin * scale, faces.origin * scale
+            for k, sign in product(range(n), (-1, 1)) if d else ():
+                if np.abs(faces.ways[k]).max() <= FREE:
+                    continue
+                here, last = faces, None
+                for _ in range(MOST):
+                    vertex = here.farthest(sign * np.eye(n)[k])
+                    if vertex is None or not np.isfinite(vertex[0]).all() or self.field.affine:
+                        break
+                    if last is not None and np.abs(vertex[0] - last).max() <= VANISHING:
+                        break
+                    last = vertex[0]
+                    again = self.faces(last * scale)
+                    if which >= len(again):
+                        vertex = None
+                        break
+                    here = again[which]
+                if vertex is None:
+                    break
+                u, keys = vertex
+                (upper if sign > 0 else lower)[k] = u[k] * scale[k] * (1.0 if np.isfinite(u[k]) else sign)
+                if np.isfinite(u).all():
+                    extremes.append(Extreme(u * scale, mode, (k, sign), keys))
+            else:
+                bounds = faces.origin, faces.ways, faces.slopes, faces.room
+                found.append(Polytope(mode, scale, *bounds, lower, upper, tuple(extremes), faces.edge))
+        return found
+
+    def faces(self, u: FloatArray) -> list[_Faces]:
+        """The bounds of the equilibria next to a state, found by Newton's method; empty: there are none."""
+        some, own = self.field.own, self.own
+        u = np.where(np.isin(np.arange(len(u)), some), u, 0.0)
+        if not some:
             return []
-        step = np.linalg.lstsq(matrix * own, right, rcond=FREE)[0]
-        u[~lacking] += step * own
-        size = float(np.abs(step).max())
-        if size <= VANISHING:
-            break
-    if size > VANISHING or (np.abs(right) > VANISHING * (np.abs(matrix) @ (own + np.abs(u[~lacking])))).any():
-        return []
-    free = _free(matrix * own)
-    ways = np.zeros((len(scale), free.shape[1]))
-    ways[~lacking] = free
-    choices: list[list[tuple[FloatArray, float, tuple[int, int]]]] = []
-    edge = False
-    for conditions in _conditions(system, mode, u, values, memory):
-        bounds, holds = [], 0
-        for one in conditions:
-            slopes = (one.slopes * own) @ free
-            length = float(np.linalg.norm(slopes))
-            if length > FREE * float(np.abs(one.slopes * own).sum()):
-                bounds.append((slopes / length, -one.top / length, one.key))
-            elif one.top <= -VANISHING * one.size:  # it never holds
-                break
-            else:
-                holds += one.bottom > VANISHING * one.size  # else zero: others decide
-        else:
-            if bounds:
-                choices.append([b for i, b in enumerate(bounds) if not any(_alike(b, a) for a in bounds[:i])])
-            elif holds:  # it always holds: a transition leads away
+        for _ in range(MOST):
+            matrix, right = self.equations(u)
+            if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
                 return []
+            step = np.linalg.lstsq(matrix * own, right, rcond=FREE)[0]
+            u[some] += step * own
+            size = float(np.abs(step).max())
+            if size <= VANISHING:
+                break
+        if size > VANISHING or (np.abs(right) > VANISHING * (np.abs(matrix) @ (own + np.abs(u[some])))).any():
+            return []
+        free = _free(matrix * own)
+        ways = np.zeros((len(u), free.shape[1]))
+        ways[some] = free
+        choices: list[list[Bound]] = []
+        edge = False
+        for conditions in self.conditions(u):
+            bounds, holds = [], 0
+            for one in conditions:
+                slopes = (one.slopes * own) @ free
+                length = float(np.linalg.norm(slopes))
+                if length > FREE * float(np.abs(one.slopes * own).sum()):
+                    bounds.append((slopes / length, -one.top / length, one.key))
+                elif one.top <= -VANISHING * one.size:  # it never holds
+                    break
+                else:
+                    holds += one.bottom > VANISHING * one.size  # else zero: others decide
             else:
-                edge = True
-    found, u = [], u / scale
-    for chosen in product(*choices):
-        rows = [b for i, b in enumerate(chosen) if not any(_alike(b, a) for a in chosen[:i])]
-        slopes = np.array([row for row, _, _ in rows]).reshape(len(rows), free.shape[1])
-        room = np.array([limit for _, limit, _ in rows])
-        found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows), edge))
-    return found
+                if bounds:
+                    choices.append(_different(bounds))
+                elif holds:  # it always holds: a transition leads away
+                    return []
+                else:
+                    edge = True
+        found, u = [], u / self.scale
+        for chosen in product(*choices):
+            rows = _different(chosen)
+            slopes = np.array([row for row, _, _ in rows]).reshape(len(rows), free.shape[1])
+            room = np.array([limit for _, limit, _ in rows])
+            found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows), edge))
+        return found
 
 
 def _free(matrix: FloatArray) -> FloatArray:
@@ -298,8 +296,13 @@ def _free(matrix: FloatArray) -> FloatArray:
     return across[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
 
 
-def _alike(a: tuple[FloatArray, float, tuple[int, int]], b: tuple[FloatArray, float, tuple[int, int]]) -> bool:
-    return bool(np.abs(a[0] - b[0]).max() < FREE and abs(a[1] - b[1]) <= FREE * max(1.0, abs(a[1])))
+def _different(bounds: Sequence[Bound]) -> list[Bound]:
+    """Bounds, of equal ones the first."""
+    found: list[Bound] = []
+    for row, limit, key in bounds:
+        if all(np.abs(row - a).max() >= FREE or abs(limit - b) > FREE * max(1.0, abs(b)) for a, b, _ in found):
+            found.append((row, limit, key))
+    return found
 
 
 def _joined(parts: list[Polytope]) -> list[EquilibriumSet]:

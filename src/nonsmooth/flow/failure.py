@@ -9,9 +9,10 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.loads import Meter, meter_of
+from nonsmooth.flow.loads import meter_of
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.derived.elements.element import SMALL
+from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import TrajectoryLog
@@ -58,33 +59,25 @@ def refuse_beyond_stops(system: System, starts: FloatArray) -> None:
 def beyond_stops(system: System, points: FloatArray, starts: FloatArray, time: Any = 0.0) -> BoolArray:
     """Marks of starts (J, n), at parameter points (J, n_parameters), that lie beyond a rigid stop by more than rounding
     leaves."""
+    gaps, scales = _gaps(system, points, starts, time)
+    return np.asarray((gaps < -SMALL * scales).any(axis=1))
+
+
+def _gaps(system: System, points: FloatArray, starts: FloatArray, time: Any) -> tuple[FloatArray, FloatArray]:
+    """The gaps (J, stops) of starts at rigid stops, and the scales (stops,) of these."""
     meter = meter_of(system)
-    if meter is None or not meter.striking:
-        return np.zeros(len(starts), dtype=bool)
-    return np.asarray(_beyond(system, meter, points, starts, time, SMALL)[0].any(axis=1))
-
-
-def _beyond(
-    system: System, meter: Meter, points: FloatArray, starts: FloatArray, time: Any, least: float
-) -> tuple[BoolArray, FloatArray]:
-    """Marks of starts that lie beyond each rigid stop by more than ``least`` of its scale, and the gaps."""
-    memory = np.tile(system.memory_vector(), (len(starts), 1))
-    with np.errstate(all="ignore"):  # beyond a stop the equations need have no values
-        gaps = meter.values(points, np.broadcast_to(time, len(starts)), starts, memory)[0]
-    sizes = np.array([system.scale_vector()[some].max(initial=0.0) for some in meter.places])
-    return gaps < -least * sizes, gaps
+    if meter is None:
+        return np.zeros((len(starts), 0)), np.zeros(0)
+    gaps = meter.values(points, np.broadcast_to(time, len(starts)), starts, system.memory_vector())[0]
+    return gaps, np.array([system.scale_vector()[some].max(initial=0.0) for some in meter.places])
 
 
 def _beyond_stop(system: System, u: FloatArray, time: float, least: float = 0.0) -> str:
     """A sentence that names the rigid stop beyond which a state lies, by more than ``least`` of its scale; nothing
     where it lies beyond none."""
+    gaps, scales = _gaps(system, system.parameter_vector(), np.asarray(u, dtype=float)[None], time)
     meter = meter_of(system)
-    if meter is None or not meter.striking:
-        return ""
-    beyond, gaps = _beyond(
-        system, meter, system.parameter_vector()[None], np.asarray(u, dtype=float)[None], time, least
-    )
-    if not beyond.any():
+    if meter is None or not (gaps < -least * scales).any():
         return ""
     load = meter.elements[meter.striking[int(gaps.argmin())]]
     sides = (
@@ -131,14 +124,11 @@ def wrong_way(system: System, log: TrajectoryLog) -> str:
         return lost
     if jump.reset is None or jump.source != jump.target:
         return ""
-    fixed = {t.t: float(log.crossing_time[-1]), **dict(zip(t.p, system.parameter_vector(), strict=True))}
-    fixed |= dict(zip(t.m, log.memory_after[-1], strict=True))
+    ends = np.array([log.u_before[-1], log.u_after[-1]])
     for row in jump.rows:
-        rate = system.derivatives.lie(row.indicator, jump.source, 1)
-        before, after = (
-            row.sign * float(rate.subs({**fixed, **dict(zip(t.u, map(float, u[-1]), strict=True))}))
-            for u in (log.u_before, log.u_after)
-        )
+        rate = numeric(t, (system.derivatives.lie(row.indicator, jump.source, 1),))
+        found = rate(system.parameter_vector(), log.crossing_time[-1], ends, log.memory_after[-1])
+        before, after = row.sign * found[:, 0]
         if before > 0.0 and after > 1e-6 * before:
             name = system.indicators[row.indicator]
             return (

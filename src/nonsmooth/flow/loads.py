@@ -107,13 +107,13 @@ class Meter:
 
     @cached_property
     def _function(self) -> Callable[..., FloatArray]:
-        """Gaps of striking elements, rates, speeds w.v, directions (in order of their states), powers."""
+        """Gaps of striking elements, rates, speeds w.v, directions, powers."""
         t = self.description.traced
         every = (
             *self.gaps,
             *(load.rate for load in self.elements),
             *(load.moved(t.u) for load in self.elements),
-            *(self.elements[k].direction[i] for k in self.striking for i in self.elements[k].direction),
+            *(self.elements[k].direction.get(i, 0) for k in self.striking for i in range(len(t.u))),
             *self.loads.powers.values(),
         )
         return numeric(t, every)
@@ -122,20 +122,10 @@ class Meter:
         self, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray
     ) -> tuple[FloatArray, ...]:
         """Those at N instants, the instants first; ``parameters`` are one row, or one for each instant."""
-        t, count, n = self.description.traced, len(self.elements), len(self.striking)
+        count, n, states = len(self.elements), len(self.striking), len(self.description.traced.u)
         found = self._function(parameters, time, np.nan_to_num(u), memory)
-        cuts = np.cumsum([n, count, count, self._entries])
-        gap, rate, moved, entries, power = np.split(found, cuts, axis=1)
-        direction, at = np.zeros((len(time), n, len(t.u))), 0
-        for j, k in enumerate(self.striking):
-            own = list(self.elements[k].direction)
-            direction[:, j, own] = entries[:, at : at + len(own)]
-            at += len(own)
-        return gap, rate, moved, direction, power
-
-    @cached_property
-    def _entries(self) -> int:
-        return sum(len(self.elements[k].direction) for k in self.striking)
+        gap, rate, moved, direction, power = np.split(found, np.cumsum([n, count, count, n * states]), axis=1)
+        return gap, rate, moved, direction.reshape(len(found), n, states), power
 
     @cached_property
     def places(self) -> list[list[int]]:

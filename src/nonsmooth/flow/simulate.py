@@ -231,19 +231,8 @@ def _dataset(
     from nonsmooth.results.schema import trajectory
 
     labels = labels_of(system)
-    source = np.array([jump.source for jump in traced.transitions], dtype=np.int64)
-    target = np.array([jump.target for jump in traced.transitions], dtype=np.int64)
-    merged = with_crossings(
-        instants,
-        log.sample_u,
-        log.sample_mode,
-        log.sample_segment,
-        log.crossing_time,
-        log.u_before,
-        log.u_after,
-        source[log.crossing_transition],
-        target[log.crossing_transition],
-    )
+    ends = np.array([(jump.source, jump.target) for jump in traced.transitions], dtype=np.int64).reshape(-1, 2)
+    merged = with_crossings(instants, log, *ends[log.crossing_transition].T)
     memory = None
     if traced.memory_names:  # constant within a segment
         first = system.memory_vector()[None, :] if not len(log.sample_memory) else log.sample_memory[:1]
@@ -284,32 +273,24 @@ class Segmented(NamedTuple):
 
 
 def with_crossings(
-    sample_time: NDArray[np.float64],
-    sample_u: NDArray[np.float64],
-    sample_mode: NDArray[np.int64],
-    sample_segment: NDArray[np.int64],
-    crossing_time: NDArray[np.float64],
-    u_before: NDArray[np.float64],
-    u_after: NDArray[np.float64],
-    mode_before: NDArray[Any],
-    mode_after: NDArray[Any],
+    instants: FloatArray, log: TrajectoryLog, mode_before: NDArray[np.int64], mode_after: NDArray[np.int64]
 ) -> Segmented:
     """Samples and crossings in one list in which every crossing stands twice.
 
     The limit before crossing k ends segment k, the limit after it begins segment k + 1; samples lie within
     their segment in the order given. A sample exactly at a crossing is kept beside the limits.
     """
-    n, count = len(sample_time), len(crossing_time)
+    n, count = len(instants), len(log.crossing_time)
     index = np.arange(count)
-    segment = np.concatenate([sample_segment, index, index + 1]).astype(np.int64)
+    segment = np.concatenate([log.sample_segment, index, index + 1])
     # Within a segment: the limit after the crossing that opened it, the samples, the limit before the next.
     place = np.concatenate([np.ones(n), np.full(count, 2.0), np.zeros(count)])
     inner = np.concatenate([np.arange(n), np.zeros(2 * count)])
     order = np.lexsort((inner, place, segment))
     return Segmented(
-        np.concatenate([sample_time, crossing_time, crossing_time])[order],
-        np.concatenate([sample_u, u_before, u_after])[order],
-        np.concatenate([sample_mode, mode_before, mode_after]).astype(np.int64)[order],
+        np.concatenate([instants, log.crossing_time, log.crossing_time])[order],
+        np.concatenate([log.sample_u, log.u_before, log.u_after])[order],
+        np.concatenate([log.sample_mode, mode_before, mode_after])[order],
         segment[order],
         np.concatenate([np.arange(n), np.full(2 * count, -1)])[order],
     )

@@ -18,7 +18,7 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.scalar import Scalar
-from nonsmooth.system.symbolic.tracing import call_scalar, call_vector
+from nonsmooth.system.symbolic.tracing import KnownFunction, call_scalar, call_vector
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition, condition_text, read_condition
 
@@ -101,17 +101,18 @@ class Map(System):
         pieces = _pieces(branches, name)
         given = {key: _number(function, f"indicator {key!r}") for key, function in (indicators or {}).items()}
         regions, borders = _regions(pieces, given, list(states))
-        modes: dict[str, Any] = {HOLD: _still}
+        still, escape = (KnownFunction([one] * len(list(states))) for one in (0, ESCAPED))
+        modes: dict[str, Any] = {HOLD: still}
         if regions == [()]:
             transitions = [Transition(HOLD, HOLD, at=0.0, reset=_image(pieces[0], list(states), "the branch"))]
         else:
-            modes[CHOOSE] = _still
+            modes[CHOOSE] = still
             transitions = [Transition(HOLD, CHOOSE, at=0.0)]
             for i, (piece, rows) in enumerate(zip(pieces, regions, strict=True)):
                 reset = _image(piece, list(states), f"branch {i + 1}")
                 transitions.append(Transition(CHOOSE, HOLD, when=condition_text(rows), reset=reset))
             nowhere = [pattern for pattern, holders in _patterns(regions).items() if not holders]
-            transitions += [Transition(CHOOSE, HOLD, when=condition_text(one), reset=_escape) for one in nowhere]
+            transitions += [Transition(CHOOSE, HOLD, when=condition_text(one), reset=escape) for one in nowhere]
         super().__init__(
             name=name,
             states=states,
@@ -218,14 +219,6 @@ def _point_with(system: Map, pattern: Rows) -> list[float] | None:
     points = random.standard_normal((DRAWN, len(scale))) * spread * scale
     inside = np.flatnonzero((numeric(traced, tuple(own))(system.parameter_vector(), u=points) > 0).all(axis=1))
     return points[inside[0]].tolist() if len(inside) else None
-
-
-def _still(t: Any, u: Any, p: Any) -> Any:
-    return [0 * x for x in u]
-
-
-def _escape(t: Any, u: Any, p: Any) -> Any:
-    return [ESCAPED for _ in u]
 
 
 def _coordinate(state: str) -> Callable[..., Any]:

@@ -63,7 +63,7 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
     build.inherit(surfaces)
     for pair in pairs:
         build.add_transitions(pair)
-    return build.put_in(lacking=tuple(build.lacking), along=tuple(build.along))
+    return build.put_in(along=tuple(build.along))
 
 
 @lru_cache(maxsize=256)
@@ -95,7 +95,6 @@ class _SlidingModes(Additions):
         self.scale = [sp.Float(scale[name]) for name in traced.state_names]
         self.moving = {traced.t, *traced.u, *traced.m}
         self.kappa = sp.Integer(1) if traced.period is None else 2 * sp.pi / traced.period
-        self.lacking = list(traced.lacking)
         #: The mode in which motion slides along a surface; none where it cannot.
         self.sliding: dict[TracedSurface, int] = {}
         self.cells = [frozenset({mode}) for mode in range(len(self.modes))]  # declared modes that meet in each mode
@@ -166,8 +165,7 @@ class _SlidingModes(Additions):
             if name in self.modes:
                 name += "".join(f"_{self.modes[mode]}" for mode in sorted(cell))
             self.sliding |= {pair: len(self.modes) for pair, _, _ in ways}
-            self.mode(name, field, shown)
-            self.lacking.append(self.lacking[first.below])
+            self.mode(name, first.below, field, shown)
             self.cells.append(cell)
             self.along.append(held)
 
@@ -269,8 +267,7 @@ class _SlidingModes(Additions):
         """The mode that says that motion is not unique behind the end of a sliding mode."""
         name = self.modes[slid] + NOT_UNIQUE
         if name not in self.modes:
-            self.mode(name, self.fields[slid], [row[slid] for row in self.outputs])
-            self.lacking.append(self.lacking[slid])
+            self.mode(name, slid, self.fields[slid], [row[slid] for row in self.outputs])
             self.along.append(self.along[slid])
         return self.modes.index(name)
 

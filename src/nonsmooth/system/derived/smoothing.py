@@ -197,7 +197,7 @@ class _Bands(Additions):
         if own is not None:
             for index, output in own.outputs.items():
                 shown[index] = output.subs(own.eta, eta)
-        self.mode(label, field, shown)
+        self.mode(label, pair.outer, field, shown)
         return len(self.modes) - 1, tuple(writes)
 
     def add(self, pairs: Sequence[_ModePair]) -> None:
@@ -212,8 +212,7 @@ class _Bands(Additions):
                 beyond = bands.get((jump.target, leads[inner, jump.rows]), ())
                 for source, target in zip(own, beyond, strict=False):
                     self.jump(source, target, *jump.rows, contact=jump.contact)
-        lacking = ((False,) * len(self.traced.u),) * (len(self.modes) - len(self.traced.mode_names))
-        self.traced, self.jumps = self.put_in(lacking=self.traced.lacking + lacking), []
+        self.traced, self.jumps = self.put_in(), []
 
     def add_pair(self, pair: _ModePair) -> list[int]:
         """Add the bands of a pair, whose modes are returned, and the transitions over their borders."""

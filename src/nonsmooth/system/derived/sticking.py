@@ -107,7 +107,7 @@ class Additions:
 
     def __init__(self, traced: Traced) -> None:
         self.traced = traced
-        self.modes, self.fields = list(traced.mode_names), list(traced.fields)
+        self.modes, self.fields, self.lacking = list(traced.mode_names), list(traced.fields), list(traced.lacking)
         self.outputs = [list(row) for row in traced.outputs]
         self.indicator_names, self.indicators = list(traced.indicator_names), list(traced.indicators)
         self.jumps: list[TracedTransition] = []
@@ -119,10 +119,11 @@ class Additions:
             self.indicators.append(expression)
         return self.indicator_names.index(name)
 
-    def mode(self, name: str, field: Sequence[sp.Expr], outputs: Iterable[sp.Expr]) -> None:
-        """Add a mode with its field and outputs."""
+    def mode(self, name: str, like: int, field: Sequence[sp.Expr], outputs: Iterable[sp.Expr]) -> None:
+        """Add a mode with its field and outputs; it lacks the states that another one lacks."""
         self.modes.append(name)
         self.fields.append(tuple(field))
+        self.lacking.append(self.lacking[like])
         for row, entry in zip(self.outputs, outputs, strict=True):
             row.append(entry)
 
@@ -144,6 +145,7 @@ class Additions:
             self.traced,
             mode_names=tuple(self.modes),
             fields=tuple(self.fields),
+            lacking=tuple(self.lacking),
             indicator_names=tuple(self.indicator_names),
             indicators=tuple(self.indicators),
             transitions=tuple(self.jumps),

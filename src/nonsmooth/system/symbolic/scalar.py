@@ -70,44 +70,12 @@ def as_written(expression: Any) -> str:
     return re.sub(r"\bt_\b", "t", text)
 
 
-def _binary(make: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return the method and the reflected method for a binary operation on expressions."""
-
-    def forward(self: Scalar, other: Any) -> Any:
-        if isinstance(other, np.ndarray) and other.ndim:
-            return NotImplemented
-        try:
-            right = to_expression(other)
-        except TypeError:
-            return NotImplemented
-        return Scalar(make(self.expression, right))
-
-    def reflected(self: Scalar, other: Any) -> Any:
-        try:
-            left = to_expression(other)
-        except TypeError:
-            return NotImplemented
-        return Scalar(make(left, self.expression))
-
-    return forward, reflected
-
-
-def _compare(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-    def compare(self: Scalar, other: Any) -> Any:
-        try:
-            return Relation(make(self.expression, to_expression(other)))
-        except TypeError:
-            return NotImplemented
-
-    return compare
-
-
 def _rest(a: Any, b: Any) -> Any:
     return a - b * sp.floor(a / b)
 
 
-class Scalar:
-    """A real number known only by its SymPy expression."""
+class Scalar(np.lib.mixins.NDArrayOperatorsMixin):
+    """A real number known only by its SymPy expression; its operators are those functions of NumPy."""
 
     __slots__ = ("expression",)
 
@@ -117,37 +85,15 @@ class Scalar:
     def __repr__(self) -> str:
         return as_written(self.expression)
 
-    __add__, __radd__ = _binary(lambda a, b: a + b)
-    __sub__, __rsub__ = _binary(lambda a, b: a - b)
-    __mul__, __rmul__ = _binary(lambda a, b: a * b)
-    __truediv__, __rtruediv__ = _binary(lambda a, b: a / b)
-    __pow__, __rpow__ = _binary(lambda a, b: a**b)
-    __mod__, __rmod__ = _binary(_rest)
-
     def __xor__(self, other: Any) -> Any:
         raise SystemDefinitionError(
             "`^` is not a power in Python (it is the exclusive or of bits): write x**3 for x to the third"
         )
 
     __rxor__ = __xor__
-    __lt__ = _compare(sp.StrictLessThan)
-    __le__ = _compare(sp.LessThan)
-    __gt__ = _compare(sp.StrictGreaterThan)
-    __ge__ = _compare(sp.GreaterThan)
-    __eq__ = _compare(sp.Eq)
-    __ne__ = _compare(sp.Ne)
 
     def __hash__(self) -> int:
         return hash(self.expression)
-
-    def __neg__(self) -> Scalar:
-        return Scalar(-self.expression)
-
-    def __pos__(self) -> Scalar:
-        return self
-
-    def __abs__(self) -> Scalar:
-        return Scalar(sp.Abs(self.expression))
 
     def __bool__(self) -> bool:
         if self.expression.is_number:
