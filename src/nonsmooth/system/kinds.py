@@ -98,7 +98,7 @@ def real_number(value: Any, what: str, kind: str = "a real number") -> float:
 
 def whole_number(value: Any, name: str, least: int) -> int:
     """``value`` as an integer of at least ``least``; 3.0 passes, 2.5, True, "3" and NaN do not."""
-    number = real_number(value, name)
+    number = real_number(value, name, "a whole number")
     if number != int(number) or number < least:
         raise ValueError(f"{name} = {shortened(value)} must be a whole number, at least {least}")
     if number > _MOST:
@@ -146,12 +146,8 @@ def reader_of(what: Any) -> Reader:
 
 
 def _number(kind: type, limit: Limit) -> Reader:
-    words = in_words(kind)
-
     def read(value: Any, name: str) -> Any:
-        number = real_number(value, name, words)
-        if kind is int:
-            number = whole_number(value, name, int(limit.low))
+        number = whole_number(value, name, int(limit.low)) if kind is int else real_number(value, name)
         if not limit.holds(number):
             raise ValueError(f"{name} = {shortened(value)} must be {limit.words}")
         return value if type(value) is int else number

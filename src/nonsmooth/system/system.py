@@ -16,6 +16,7 @@ from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.show import latex, page, table
+from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symmetry import Symmetry
 from nonsmooth.system.text import read_system, write_system
@@ -23,6 +24,7 @@ from nonsmooth.system.transition import Band, Mode, Surface, Transition
 from nonsmooth.system.variant import (
     Derivatives,
     Variant,
+    positive,
     smoothed_values,
     variant_of,
 )
@@ -194,7 +196,10 @@ class System(Answering):
         """The equations as expressions; those of the smoothed system where it is smoothed.
 
         Where modes are made when they are first visited, the names of those visited so far (see `written_out`)."""
-        return self._variant.visited
+        traced = self._variant.traced
+        if traced.decider is not None:
+            return traced.decider.known()
+        return traced if traced.patterns is None else traced.patterns.seen()
 
     @property
     def declared(self) -> Traced:
@@ -246,7 +251,12 @@ class System(Answering):
 
     def period_at(self, values: Mapping[str, float] | Sequence[float] | np.ndarray) -> float | None:
         """Return the forcing period at other values: a mapping (others stay), or a vector in declared order."""
-        return self._variant.period_at(self.values, values)
+        traced = self._variant.traced
+        if traced.period is None:
+            return None
+        if isinstance(values, Mapping):
+            values = [values.get(key, value) for key, value in self.values.items()]
+        return float(numeric(traced, (traced.period,), quick=True)([*map(float, values)])[0])
 
     def parameter_points(self, columns: Mapping[str, Any]) -> np.ndarray:
         """Return checked rows of parameter values, (P, n_parameters), for columns of equal length P.
@@ -256,7 +266,22 @@ class System(Answering):
         ValueError, SystemDefinitionError
             An unknown name, a value that is not finite, or one the equations do not allow.
         """
-        return self._variant.rows(self.values, columns)
+        variant = self._variant
+        lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
+        sizes = {column.shape for column in lists.values()}
+        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
+            raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
+        points = np.tile(self.parameter_vector(), (next(iter(sizes))[0] if sizes else 1, 1))
+        for key, column in lists.items():
+            variant.check_known(key)
+            if not np.isfinite(column).all():
+                raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
+            if key in dict(variant.etas):
+                positive(float(column.min()), key)
+            points[:, [*self.values].index(key)] = column
+        if len(points):
+            variant.domain.check_points(points)
+        return points
 
     # Copies
 

@@ -8,12 +8,11 @@ All are expanded, so that "is it constant?" is a question about free symbols.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import shortened, unknown
@@ -21,7 +20,6 @@ from nonsmooth.system.description import Description
 from nonsmooth.system.kinds import real_number
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.domain import Domain
-from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import Traced, along
 
 SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
@@ -76,23 +74,6 @@ class Variant:
             "band": band,
         }
 
-    @property
-    def visited(self) -> Traced:
-        """The equations; where modes are made when they are first visited, the names of those visited so far."""
-        if self.traced.decider is not None:
-            return self.traced.decider.known()
-        return self.traced if self.traced.patterns is None else self.traced.patterns.seen()
-
-    def period_at(
-        self, now: Mapping[str, float], values: Mapping[str, float] | Sequence[float] | np.ndarray
-    ) -> float | None:
-        """The forcing period at other values than those of ``now``: a mapping (others stay), or all in order."""
-        if self.traced.period is None:
-            return None
-        if isinstance(values, Mapping):
-            values = [values.get(key, value) for key, value in now.items()]
-        return float(numeric(self.traced, (self.traced.period,), quick=True)([*map(float, values)])[0])
-
     def eta(self, values: Mapping[str, float]) -> float | dict[str, float] | None:
         """Half width of the bands: None, a number, or a number for each indicator."""
         if self.kind == SHARP:
@@ -113,37 +94,17 @@ class Variant:
             changes = {**mapping, **changes}
         new = dict(values)
         for key, value in changes.items():
-            self._check_known(key)
+            self.check_known(key)
             if type(value) is not float or value - value != 0:
                 value = real_number(value, f"parameter {key!r}")
             new[key] = value
         for key, _ in self.etas:
             if key in changes:
-                _positive(new[key], key)
+                positive(new[key], key)
         self.domain.check(new, changes)
         return new
 
-    def rows(self, values: Mapping[str, float], columns: Mapping[str, Any]) -> np.ndarray:
-        """Rows of values (P, n_parameters) in declared order, for columns of equal length P."""
-        lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
-        sizes = {column.shape for column in lists.values()}
-        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
-            raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
-        now = np.array(list(values.values()), dtype=np.float64)
-        points = np.tile(now, (next(iter(sizes))[0] if sizes else 1, 1))
-        order = list(values)
-        for key, column in lists.items():
-            self._check_known(key)
-            if not np.isfinite(column).all():
-                raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
-            if key in dict(self.etas):
-                _positive(float(column.min()), key)
-            points[:, order.index(key)] = column
-        if len(points):
-            self.domain.check_points(points)
-        return points
-
-    def _check_known(self, key: str) -> None:
+    def check_known(self, key: str) -> None:
         """ValueError for what is no parameter."""
         if key not in self.parameters:
             units = {name: parameter.unit for name, parameter in self.parameters.items()}
@@ -249,12 +210,12 @@ def smoothed_values(
     else:
         variant = variant_of(description, ONE_ETA, band)
         widths = {"eta": eta}
-    new = plain | {key: _positive(real_number(width, key), key) for key, width in widths.items()}
+    new = plain | {key: positive(real_number(width, key), key) for key, width in widths.items()}
     variant.domain.check(new)
     return new, variant
 
 
-def _positive(width: float, key: str) -> float:
+def positive(width: float, key: str) -> float:
     if width <= 0:
         raise ValueError(f"{key} is the half width of a band and must be positive, not {width}")
     return width

@@ -6,7 +6,6 @@ states behind the others, that nothing but transitions changes.
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -64,7 +63,6 @@ class LinearEngine(Engine):
     scale: FloatArray  # (n,)
     name: str = "exact"
     net: Any = field(init=False)  # ``kernels.records.Net``
-    _local: threading.local = field(default_factory=threading.local, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         self.net = pack_net(self.traced)
@@ -100,7 +98,7 @@ class LinearEngine(Engine):
 
             self.form = linear_form(self.traced.without_answers()[0]) or self.form
             tables.form = self.prepare(tables.points).form
-        local = self._local
+        local = self._threads
         if not hasattr(local, "work"):
             n, harmonics = tables.form.A.shape[-1], len(tables.form.multiples)
             local.work, local.last = scratch(n, harmonics, *tables.sizes), tables
