@@ -28,7 +28,6 @@ def test_each_crossing_stands_twice_between_the_samples() -> None:
     np.testing.assert_array_equal(result.u[:, 0], [0, 1, 1.0, -1.0, 2, 2.0, -2.0, 3])
     np.testing.assert_array_equal(result.segment, [0, 0, 0, 1, 1, 1, 2, 2])
     np.testing.assert_array_equal(result.mode, [0, 0, 0, 1, 1, 1, 0, 0])
-    np.testing.assert_array_equal(result.source, [0, 1, -1, -1, 2, -1, -1, 3])
     assert len(result.time) == n + 4
 
 

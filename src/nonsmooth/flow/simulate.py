@@ -241,35 +241,18 @@ def _dataset(
     if traced.output_names:
         kept = np.zeros((len(merged.time), 0)) if memory is None else memory
         outputs = output_values(traced, system.parameter_vector(), merged.time, merged.u, kept, merged.mode)
-    return trajectory(
-        labels,
-        provenance(labels, "simulate", options, method=method),
-        time=merged.time,
-        u=merged.u,
-        mode=merged.mode,
-        segment=merged.segment,
-        crossing_time=log.crossing_time,
-        crossing_transition=log.crossing_transition,
-        u_before=log.u_before,
-        u_after=log.u_after,
-        touch_time=log.touch_time,
-        touch_indicator=log.touch_indicator,
-        touch_u=log.touch_u,
-        touch_clearance=log.touch_clearance,
-        outputs=outputs,
-        memory=memory,
-        status=log.status,
-    )
+    own = {name: one for name, one in vars(log).items() if not name.startswith(("sample_", "memory_"))}
+    record = provenance(labels, "simulate", options, method=method)
+    return trajectory(labels, record, **merged._asdict(), **own, outputs=outputs, memory=memory)
 
 
 class Segmented(NamedTuple):
-    """``source[i]`` tells where row i comes from: k >= 0 the sample k; -1 a limit at a crossing."""
+    """Samples and both limits of each crossing, by time."""
 
     time: NDArray[np.float64]
     u: NDArray[np.float64]
     mode: NDArray[np.int64]
     segment: NDArray[np.int64]
-    source: NDArray[np.int64]
 
 
 def with_crossings(
@@ -292,5 +275,4 @@ def with_crossings(
         np.concatenate([log.sample_u, log.u_before, log.u_after])[order],
         np.concatenate([log.sample_mode, mode_before, mode_after])[order],
         segment[order],
-        np.concatenate([np.arange(n), np.full(2 * count, -1)])[order],
     )

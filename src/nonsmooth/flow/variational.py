@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from nonsmooth.flow.saltation import Jump, Touch, chained, of_one_instant
 from nonsmooth.kernels.hybrid.kept import Segments
 from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import along
-from nonsmooth.system.transition import phase_slopes, varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -48,6 +47,7 @@ class VariationalFlow:
 
     def __init__(self, traced: Traced, active: tuple[str, ...], scale: FloatArray) -> None:
         self.active, self.places = active, tuple(traced.parameter_names.index(name) for name in active)
+        self.symbols = tuple(traced.p[i] for i in self.places)
         self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
         self.n_active, self.n_p = len(active), len(traced.p)
         self.scale = np.concatenate([scale, np.ones(len(traced.m))])
@@ -215,7 +215,7 @@ class VariationalFlow:
             orders = [now.indicators[i]]
             for _ in range(2):
                 orders.append(along(orders[-1], now.t, now.u, now.fields[mode]))
-            variables = (*now.u, *now.m, now.t, *(now.p[k] for k in self.places))
+            variables = (*now.u, *now.m, now.t, *self.symbols)
             self._touches[i, mode] = numeric(now, tuple(orders), variables, quick=True)
         numbers = np.asarray(z, dtype=float).tolist()
         n, n_u = self.n, self.n_u
@@ -230,24 +230,18 @@ class VariationalFlow:
         at = self.traced.transitions[k].at
         if isinstance(at, int | float):
             return float(at), self._no_timing
-        found, slopes = self._phases
-        return float(found(values)[k]), slopes(values)[k]
-
-    @cached_property
-    def _phases(self) -> Any:
-        return varying_phases(self.traced), phase_slopes(self.traced, self.places)
+        return self._of_parameters(at, values)
 
     def period(self, values: Any) -> tuple[float, FloatArray]:
         """Forcing period T and dT/dp (n_active,); infinite and zeros where there is none."""
         if self.traced.period is None:
             return np.inf, self._no_timing
-        numbers = self._period(np.asarray(values, dtype=float).tolist())
-        return float(numbers[0]), np.array(numbers[1:], dtype=float)
+        return self._of_parameters(self.traced.period, values)
 
-    @cached_property
-    def _period(self) -> Any:
-        slopes = tuple(self.traced.p[i] for i in self.places)
-        return numeric(self.traced, (self.traced.period,), slopes, quick=True)
+    def _of_parameters(self, expression: Any, values: Any) -> tuple[float, FloatArray]:
+        """An expression of parameters, and its derivatives in the active ones."""
+        found = numeric(self.traced, (expression,), self.symbols, quick=True)(np.asarray(values, dtype=float).tolist())
+        return float(found[0]), np.array(found[1:])
 
     @property
     def n_moving(self) -> int:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.saltation import Touch
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.system.codegen.linear import apart, linear_form
+from nonsmooth.system.codegen.variations import VariationalModel
 from nonsmooth.system.derived.deciding import decide
 from nonsmooth.system.derived.instants import RowNumbers
 from nonsmooth.system.derived.patterns import STEP, Patterns, Reset
@@ -31,19 +31,6 @@ if TYPE_CHECKING:
 NONE = np.zeros(0)
 KEPT = 4  # parameter points whose rows are kept by a thread
 SIZES = 6  # numbers at the head
-
-
-@dataclass(frozen=True)
-class RowsModel:
-    """The functions of ``kernels.tangent.rows``, as those of a model (``codegen.variations.VariationalModel``)."""
-
-    jet: Any
-    field: Any
-    switch: Any
-    path: Any
-    entries: Any
-    kinds: Any
-    n_scratch: int
 
 
 class RowsFlow(VariationalFlow):
@@ -68,7 +55,8 @@ class RowsFlow(VariationalFlow):
         jet, field, switch, path = map(compiled, (rows.jet, rows.field, rows.switch, rows.path))
         entries = np.repeat(np.arange(n, dtype=np.int64)[:, None], 2, axis=1)  # the diagonal, of which the sum is asked
         kinds = np.ones((modes, n), dtype=np.int64)
-        model = RowsModel(jet, field, switch, path, entries, kinds, 2 * self.harmonics + max(1, self.n_active))
+        n_scratch = 2 * self.harmonics + max(1, self.n_active)
+        model = VariationalModel(jet, field, switch, entries, kinds, n_scratch, path)
         return model, range(len(self.traced.transitions))
 
     @property

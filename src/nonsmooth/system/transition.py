@@ -232,10 +232,3 @@ def varying_phases(traced: Traced) -> Callable[[Any], NDArray[np.float64]] | Non
         return None
     function = numeric(traced, found, quick=True)
     return lambda values: np.array(function(np.asarray(values, dtype=float).tolist()))
-
-
-@lru_cache(maxsize=32)
-def phase_slopes(traced: Traced, places: tuple[int, ...]) -> Callable[[Any], NDArray[np.float64]]:
-    """Derivatives (transitions, parameters) of the phases in the parameters at ``places``."""
-    function = numeric(traced, tuple(jump.at or 0 for jump in traced.transitions), tuple(traced.p[i] for i in places))
-    return lambda values: function(values)[:, 1:]

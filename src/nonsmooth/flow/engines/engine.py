@@ -90,7 +90,6 @@ class TrajectoryLog:
     touch_u: FloatArray  # (n_touches, n)
     touch_clearance: FloatArray  # (n_touches,) = -(sign * indicator) > 0 at the extremum
     status: int
-    message: str = ""
 
 
 PATIENCE = 50_000  # steps of a run between two looks whether somebody wants to stop it: seconds of the slowest

@@ -283,31 +283,16 @@ class Engine(ABC):
         state.settled = True
         tally = system[3].tally
         n_c, n_t = tally[CROSSINGS], tally[TOUCHES]
-        times, transitions, before, after, memory = [part[:n_c].copy() for part in crossings] if n_c else self._none[1]
+        taken = [part[:n_c].copy() for part in crossings] if n_c else self._none[1]
         by_time = np.argsort(touches[0][:n_t], kind="stable")  # those of a segment come by condition
-        touch_times, indicators, touch_u, clearances = [part[by_time] for part in touches] if n_t else self._none[2]
-        _, sample_u, sample_memory, sample_mode, sample_segment = sampled
+        touched = [part[by_time] for part in touches] if n_t else self._none[2]
+        log = TrajectoryLog(*(*sampled[1:], *taken, *touched, int(code)))
         lacking, jumps = self.lacking == 1, self.traced.transitions
         if lacking.any():
-            sample_u[lacking[sample_mode] & (sample_mode >= 0)[:, None]] = np.nan
-            before[lacking[[t.source for t in jumps]][transitions]] = np.nan
-            after[lacking[[t.target for t in jumps]][transitions]] = np.nan
-        return TrajectoryLog(
-            sample_u,
-            sample_memory,
-            sample_mode,
-            sample_segment,
-            times,
-            transitions,
-            before,
-            after,
-            memory,
-            touch_times,
-            indicators,
-            touch_u,
-            clearances,
-            int(code),
-        )
+            log.sample_u[lacking[log.sample_mode] & (log.sample_mode >= 0)[:, None]] = np.nan
+            log.u_before[lacking[[t.source for t in jumps]][log.crossing_transition]] = np.nan
+            log.u_after[lacking[[t.target for t in jumps]][log.crossing_transition]] = np.nan
+        return log
 
 
 def _samples(instants: FloatArray, n: int, n_memory: int) -> list[Any]:

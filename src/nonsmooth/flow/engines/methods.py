@@ -46,7 +46,7 @@ def engine_for(
         A method that does not fit, or tolerances for a method that has none.
     """
     tolerance = RTOL if rtol is None else rtol
-    absolute = _absolute(system, atol)
+    absolute = None if atol is None else _absolute(system, atol)
     expert: dict[str, Any] = ({} if order is None else {"order": order}) | ({} if locate else {"locate": False})
     if order is not None and method in ("exact", "rkf45"):
         raise ValueError(f'order is that of method="taylor"; method={method!r} has its own')
@@ -134,10 +134,8 @@ def warn_if_coarse(system: System, engine: Engine, largest: FloatArray) -> None:
         )
 
 
-def _absolute(system: System, atol: Any) -> FloatArray | None:
+def _absolute(system: System, atol: Any) -> FloatArray:
     """Absolute tolerances per state."""
-    if atol is None:
-        return None
     names = list(system.states)
     if isinstance(atol, Mapping):
         missing = set(names) ^ set(atol)

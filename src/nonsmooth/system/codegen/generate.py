@@ -6,7 +6,6 @@ The module is plain text with four functions of fixed signatures, compiled throu
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -55,8 +54,6 @@ class CompiledModel:
         Rows of W; at least 1.
     smooth_outputs : tuple of bool
         False where an output has a corner in some mode: there its series is NaN from coefficient 1 on.
-    content_hash : str
-        Hash of the generated source.
     """
 
     field: Any
@@ -65,7 +62,6 @@ class CompiledModel:
     jump: Any
     n_scratch: int
     smooth_outputs: tuple[bool, ...]
-    content_hash: str
 
 
 @lru_cache(maxsize=MOST_MODELS)
@@ -79,8 +75,7 @@ def compile_model(traced: Traced) -> CompiledModel:
     """
     from nonsmooth.kernels.compile.cache import load_module
 
-    source = model_source(traced)
-    module = load_module(source, "model", lasting=False)
+    module = load_module(model_source(traced), "model", lasting=False)
     return CompiledModel(
         field=module.field,
         jet=module.jet,
@@ -88,7 +83,6 @@ def compile_model(traced: Traced) -> CompiledModel:
         jump=module.jump,
         n_scratch=module.N_SCRATCH,
         smooth_outputs=module.SMOOTH_OUTPUTS,
-        content_hash=hashlib.sha256(source.encode()).hexdigest(),
     )
 
 

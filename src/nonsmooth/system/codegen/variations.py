@@ -58,6 +58,8 @@ class VariationalModel:
         0: zero in this mode, 1: constant, 2: varying.
     n_scratch : int
         Rows of W.
+    path
+        The jet without small changes, of those that no expressions are compiled for.
     """
 
     jet: Any
@@ -66,6 +68,7 @@ class VariationalModel:
     entries: NDArray[np.int64]
     kinds: NDArray[np.int64]
     n_scratch: int
+    path: Any = None
 
 
 @lru_cache(maxsize=MOST_MODELS)

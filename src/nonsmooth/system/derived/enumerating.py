@@ -17,7 +17,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.system.derived.faces import as_sums, independent, weakest
+from nonsmooth.system.derived.faces import as_sums, independent, linked, weakest
 from nonsmooth.system.derived.instants import ZERO
 
 MOST = 4096  # combinations that are tried
@@ -57,17 +57,10 @@ class Candidates:
 
     def blocks(self, G: FloatArray) -> list[list[list[dict[int, int]]]]:
         """The choices apart by whose forces change whose rates."""
-        acts, at = (G != 0.0) | (G.T != 0.0), {k: i for i, k in enumerate(self.elements)}
-        left, found = self.choices(), []
-        while left:
-            block = [left.pop(0)]
-            for one in block:
-                mine = [at[k] for k in one[0]]
-                near = [other for other in left if acts[np.ix_(mine, [at[k] for k in other[0]])].any()]
-                left = [other for other in left if other not in near]
-                block += near
-            found.append(block)
-        return found
+        at, every = {k: i for i, k in enumerate(self.elements)}, self.choices()
+        own = [[at[k] for k in one[0]] for one in every]
+        acts = np.array([[G[np.ix_(one, other)].any() for other in own] for one in own])
+        return [[every[i] for i in some] for some in linked(acts)]
 
 
 @dataclass

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.derived.sticking import Additions, without_sticking
+from nonsmooth.system.derived.sticking import Additions, joined, without_sticking
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedBand
 from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
@@ -290,7 +290,7 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
         build.mix(pairs)
     else:
         apart += _check_apart(build, pairs)
-        for surface in _surfaces(pairs):
+        for surface in joined({row.indicator for row in pair.rows} for pair in pairs):  # one step over each surface
             build.add(_pairs(build.traced, surface))
     traced = replace(
         build.traced,
@@ -300,16 +300,6 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
         memory_names=old.memory_names + tuple(name for name, _ in build.memory),
     )
     return Smoothed(traced, etas, tuple(build.memory), tuple(apart))
-
-
-def _surfaces(pairs: Sequence[_ModePair]) -> list[set[int]]:
-    """The indicators of the pairs, those of one pair together: the bands over each of these surfaces are one step."""
-    found: list[set[int]] = []
-    for pair in pairs:
-        own = {row.indicator for row in pair.rows}
-        apart = [one for one in found if not one & own]
-        found = [*apart, own.union(*(one for one in found if one & own))]
-    return found
 
 
 def _check_surfaces(description: Description) -> list[tuple[sp.Expr, str]]:

@@ -34,12 +34,11 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
     apart = [needed for (mode, h), ends in sticks.items() for needed in _equal_friction(traced, mode, h, ends)]
     between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & dropped}
     left = [jump for jump in traced.transitions if not {jump.source, jump.target} & dropped]
-    joined = [{mode} for mode in range(len(traced.mode_names)) if mode not in dropped]
-    for ends in ({jump.source, jump.target} for jump in left):
-        joined = [one for one in joined if not one & ends] + [set.union(*(one for one in joined if one & ends))]
+    every = [{mode} for mode in range(len(traced.mode_names)) if mode not in dropped]
+    regions = joined([*every, *({jump.source, jump.target} for jump in left)])
     # Where two stick at once, a question led there and back: other surfaces alone are left to stick to.
-    freed = [len({h for (_, h), ends in sticks.items() if one & {*ends.values()}}) for one in joined]
-    kept = sorted(set.union(*(one for one, own in zip(joined, freed, strict=True) if own == max(freed))))
+    freed = [len({h for (_, h), ends in sticks.items() if one & {*ends.values()}}) for one in regions]
+    kept = sorted(set.union(*(one for one, own in zip(regions, freed, strict=True) if own == max(freed))))
     jumps: dict[tuple[int, int, tuple[TracedCondition, ...]], TracedTransition] = {}
     for jump in left:
         if jump.source not in kept:
@@ -63,6 +62,14 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
         outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs),
         along=(),
     ), apart
+
+
+def joined(sets: Iterable[set[int]]) -> list[set[int]]:
+    """Sets, those that share an entry as one."""
+    found: list[set[int]] = []
+    for own in sets:
+        found = [*(one for one in found if not one & own), own.union(*(one for one in found if one & own))]
+    return found
 
 
 def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) -> list[tuple[sp.Expr, str]]:
