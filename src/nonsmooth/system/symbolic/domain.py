@@ -1,7 +1,6 @@
 """Facts of the traced equations about parameters: the forcing period, and values that divide nothing by zero.
 
-Parts of the expressions that depend on parameters alone are collected once. A single parameter in a
-denominator, by far the most common, is then a look-up; others are evaluated.
+Parts of the expressions that depend on parameters alone are collected once, and evaluated all together.
 
 Time may enter in sin, cos, tan of arguments linear in t; their frequencies must be rational multiples
 of one another. Anything else needs ``period=``, which is checked against the equations.
@@ -9,9 +8,8 @@ of one another. Anything else needs ``period=``, which is checked against the eq
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -108,6 +106,10 @@ def check_period(
 
 #: Of each kind of rule, which finite numbers it allows, and the sentence on another.
 _RULES: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "divisor": (
+        lambda x: x != 0,
+        "{text} = 0 makes {owner} divide by zero: give {text} another value, or write it without that division",
+    ),
     "nonzero": (lambda x: x != 0, "{given} makes {owner} divide by zero: {text} = {number}"),
     "nonnegative": (lambda x: x >= 0, "{given} makes {owner} take the root of {text}, which is not positive"),
     "positive": (lambda x: x > 0, "{given} makes {owner} take the logarithm of {text}, which is not positive"),
@@ -123,86 +125,44 @@ _RULES: dict[str, tuple[Callable[[Any], Any], str]] = {
 }
 
 
-class _Rule:
-    """One expression of the parameters and what it must be."""
-
-    def __init__(self, expression: sp.Expr, kind: str, owner: str, traced: Traced) -> None:
-        self.expression, self.owner, self.traced = expression, owner, traced
-        self._allowed, self._says = _RULES[kind]
-        known = zip(traced.p, traced.parameter_names, strict=True)
-        self.used = [name for symbol, name in known if symbol in expression.free_symbols]
-
-    @cached_property
-    def of(self) -> Callable[[Any], Any]:
-        """The expression at rows of values, (P, 1)."""
-        return numeric(self.traced, (self.expression,))
-
-    def check(self, values: Mapping[str, float]) -> None:
-        (number,) = self.of([values[name] for name in self.traced.parameter_names])
-        if not self.allows(number):
-            given = ", ".join(f"{name} = {values[name]!r}" for name in self.used)
-            text = self.expression.subs({s: sp.Symbol(n) for s, n in self.traced.named().items()})
-            says = self._says.format(given=given, owner=self.owner, text=text, number=number)
-            raise SystemDefinitionError(says)
-
-    def allows(self, number: Any) -> Any:
-        return np.isfinite(number) & self._allowed(number)
-
-
 class Domain:
     """The conditions on the parameters of a traced system; ``apart`` are further expressions of them that must not be
     negative, each with its message."""
 
     def __init__(self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = ()) -> None:
-        self._names = traced.parameter_names
-        self._zero: dict[str, str] = {}  # parameter -> what divides by it
-        self._rules: list[_Rule] = []
-        symbols = set(traced.p)
-        owned = timed_expressions(traced)
-        if traced.period is not None:
-            owned["the forcing period"] = traced.period
+        owned, period = timed_expressions(traced), traced.period
         phases = {f"`at` of {jump.label}": jump.at for jump in traced.transitions if hasattr(jump.at, "free_symbols")}
-        owned |= phases
-        seen: set[tuple[sp.Expr, str]] = set()
+        owned |= phases if period is None else {"the forcing period": period, **phases}
+        rules: dict[tuple[sp.Expr, str], str] = {}  # expression and kind -> what it belongs to
         for owner, expression in owned.items():
-            for part, kind in _restricted(expression, symbols):
-                if (part, kind) in seen:
-                    continue
-                seen.add((part, kind))
-                if part.is_Symbol and kind == "nonzero":
-                    self._zero[self._names[traced.p.index(part)]] = owner
-                else:
-                    self._rules.append(_Rule(part, kind, owner, traced))
-        if traced.period is not None:
-            self._rules.append(_Rule(traced.period, "period", "", traced))
-        self._rules += [_Rule(phase, "phase", owner, traced) for owner, phase in phases.items()]
-        self._rules += [_Rule(expression, "apart", message, traced) for expression, message in apart]
-
-    def check(self, values: Mapping[str, float], changed: Collection[str] | None = None) -> None:
-        """Raise SystemDefinitionError where ``values`` are not allowed; only what depends on those that ``changed`` has
-        to be looked at."""
-        for name in values if changed is None else changed:
-            if name in self._zero and values[name] == 0:
-                raise SystemDefinitionError(self._by_zero(name))
-        for rule in self._rules:
-            if changed is None or any(name in changed for name in rule.used):
-                rule.check(values)
-
-    def _by_zero(self, name: str) -> str:
-        return (
-            f"{name} = 0 makes {self._zero[name]} divide by zero: give {name} another value, or write it without "
-            f"that division"
+            for part, kind in _restricted(expression, set(traced.p)):
+                rules.setdefault((part, kind), owner)
+        rules |= {} if period is None else {(period, "period"): ""}
+        rules |= {(phase, "phase"): owner for owner, phase in phases.items()}
+        self._rules = rules | {(expression, "apart"): message for expression, message in apart}
+        used = set[sp.Basic]().union(*(expression.free_symbols for expression, _ in self._rules))
+        self._traced, self._used = (
+            traced,
+            {name for p, name in zip(traced.p, traced.parameter_names, strict=True) if p in used},
         )
+
+    def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None) -> None:
+        """Raise SystemDefinitionError where ``values`` are not allowed, of which some have ``changed``."""
+        if changed is None or not self._used.isdisjoint(changed):
+            self.check_points(np.array([[values[name] for name in self._traced.parameter_names]]))
 
     def check_points(self, points: np.ndarray) -> None:
         """Check rows of parameter values (P, n_parameters), all points of a sweep or a chart, in one go."""
-        for name in self._zero:
-            if (points[:, self._names.index(name)] == 0).any():
-                raise SystemDefinitionError(self._by_zero(name))
-        for rule in self._rules:
-            allowed = rule.allows(rule.of(points)[:, 0])
-            if not allowed.all():
-                rule.check(dict(zip(self._names, points[~allowed][0].tolist(), strict=True)))
+        numbers = numeric(self._traced, tuple(expression for expression, _ in self._rules))(points)
+        for ((expression, kind), owner), column in zip(self._rules.items(), numbers.T, strict=True):
+            allows, says = _RULES[kind]
+            refused = ~(np.isfinite(column) & allows(column))
+            if refused.any():
+                i = int(refused.argmax())
+                values = zip(self._traced.p, self._traced.parameter_names, points[i].tolist(), strict=True)
+                given = ", ".join(f"{name} = {value!r}" for p, name, value in values if p in expression.free_symbols)
+                text = expression.subs({s: sp.Symbol(n) for s, n in self._traced.named().items()})
+                raise SystemDefinitionError(says.format(given=given, owner=owner, text=text, number=column[i]))
 
 
 def _restricted(expression: sp.Expr, parameters: set[sp.Symbol]) -> Iterator[tuple[sp.Expr, str]]:
@@ -212,7 +172,7 @@ def _restricted(expression: sp.Expr, parameters: set[sp.Symbol]) -> Iterator[tup
         if not base.free_symbols or not base.free_symbols <= parameters:
             continue
         if exponent.is_negative or (exponent.is_number and exponent < 0):
-            yield base, "nonzero"
+            yield base, "divisor" if base.is_Symbol else "nonzero"
         if not exponent.is_integer:
             yield base, "nonnegative"
     for logarithm in expression.atoms(sp.log):
