@@ -88,7 +88,7 @@ class _Numbers(ModeField):
     def evaluate(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        field, w = self._field(values), self._augmented(u, values, t)
+        field, w = self._field(values), self.patterns.rows_at(values).augmented(u, t)
         slopes = [w @ self._field(values, place).imag.T / STEP for place in self.places]
         J = np.broadcast_to(field[:, : len(u)], (*np.shape(t), len(u), len(u)))
         return w @ field.T, J, np.stack(slopes, axis=-1) if slopes else np.zeros((*np.shape(t), len(u), 0))
@@ -96,18 +96,13 @@ class _Numbers(ModeField):
     def indicators(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        rows, _, _ = self.patterns.ways_out(self.patterns.rows_at(values), self.pattern)
-        rows = np.nan_to_num(rows)  # NaN: not asked for
+        here = self.patterns.rows_at(values)
+        rows = np.nan_to_num(self.patterns.ways_out(here, self.pattern)[0])  # NaN: not asked for
         slopes = np.broadcast_to(rows[:, : len(u)], (*np.shape(t), len(rows), len(u)))
-        return self._augmented(u, values, t) @ rows.T, slopes
+        return here.augmented(u, t) @ rows.T, slopes
 
     def _field(self, values: FloatArray, place: int | None = None) -> FloatArray:
         return self.patterns.rows_at(values, place).flow(self.patterns.mode, self.pattern)[0]
-
-    def _augmented(self, u: FloatArray, values: FloatArray, t: Any) -> FloatArray:
-        rows, times = self.patterns.rows_at(values), np.atleast_1d(t)
-        w = rows.augmented_all(np.tile(u, (len(times), 1)), times)
-        return w if np.ndim(t) else w[0]
 
 
 @lru_cache(maxsize=256)

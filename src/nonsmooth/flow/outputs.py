@@ -52,7 +52,7 @@ def _shared(
 
         def value(law: Any, here: Any = here) -> FloatArray:
             if rows is not None:
-                found: FloatArray = rows.augmented_all(u[here], time[here]) @ law.values
+                found: FloatArray = rows.augmented(u[here], time[here]) @ law.values
                 return found
             of: FloatArray = numeric(traced, (law,))(parameters, time[here], u[here], memory[here])[:, 0]
             return of

@@ -60,6 +60,18 @@ class State:
         return State(self.u.copy(), self.memory.copy(), self.clock.copy(), self.counters.copy(), self.settled)
 
 
+@dataclass
+class Points:
+    """Parameter points as an engine prepares them, shared by threads: what stands for the system there, its sizes, and
+    what each thread keeps beside them."""
+
+    points: FloatArray  # (P, n_parameters)
+    period: FloatArray  # (P,), inf where autonomous
+    form: Any = None  # ``kernels.records.Form``
+    sizes: tuple[int, ...] = ()  # modes, indicators, outputs, rows of conditions
+    local: threading.local = field(default_factory=threading.local)
+
+
 class Changes(NamedTuple):
     """Instants (K,) at which states that stand for inputs change, their values (K, m) from then on, and the number of
     the first of these states."""

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.devices import OnGpu, StatesOnGpu
-from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Points
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
-from nonsmooth.flow.engines.series import SeriesEngine, SeriesPoints
+from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.codes import METHODS
 from nonsmooth.kernels.hybrid.kept import Kept, Section
@@ -158,7 +158,7 @@ STEPS = 1024  # of one launch, at most: below a second also on a small GPU
 PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)
 
 
-def module_of(engine: SeriesEngine, tables: SeriesPoints) -> Any:
+def module_of(engine: SeriesEngine, tables: Points) -> Any:
     """The kernels for an engine's system, method and order."""
     from nonsmooth.kernels.cuda.module import cuda_series_module, cuda_series_source
     from nonsmooth.system.codegen.generate import model_source

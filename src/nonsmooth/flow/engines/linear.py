@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.flow.engines.engine import FloatArray, Points
 from nonsmooth.flow.engines.loop import Engine, pack_net
 from nonsmooth.kernels.compile.pointers import one_block
 from nonsmooth.kernels.hybrid.codes import N_MEMO, N_TALLY
@@ -45,16 +45,6 @@ def table_bytes(states: int, harmonics: int, modes: int) -> int:
 
 
 @dataclass
-class LinearPoints:
-    """Arrays of the kernel for P parameter points."""
-
-    points: FloatArray
-    form: Any  # ``kernels.records.Form``
-    period: FloatArray
-    sizes: tuple[int, int, int, int]  # modes, indicators, outputs, rows of conditions
-
-
-@dataclass
 class LinearEngine(Engine):
     """``Engine`` over ``kernels.linear`` for one system's traced form."""
 
@@ -70,7 +60,7 @@ class LinearEngine(Engine):
     def step_in(self, mode: int, system: Any) -> float:
         return float(system[2].info[mode, 0])
 
-    def prepare(self, points: FloatArray) -> LinearPoints:
+    def prepare(self, points: FloatArray) -> Points:
         from nonsmooth.kernels.compile.cache import compiled
 
         form = self.form.evaluate(points)
@@ -79,7 +69,7 @@ class LinearEngine(Engine):
             form = _with_harmonic(form)
         if len(points) > 1:  # threads may share them
             compiled(self.module().run)
-        return LinearPoints(points, form, form.period, sizes)
+        return Points(points, form.period, form, sizes)
 
     @property
     def is_planar(self) -> bool:
@@ -91,7 +81,7 @@ class LinearEngine(Engine):
 
         return linear_module(self.is_planar)
 
-    def given(self, tables: LinearPoints) -> tuple[Any, Any, Any]:
+    def given(self, tables: Points) -> tuple[Any, Any, Any]:
         """The present thread's tables and work; the kernel keeps the tables of the last point in them."""
         if tables.form.ra.shape[1] < len(self.net.changed):  # some were found since
             from nonsmooth.system.codegen.linear import linear_form
@@ -128,7 +118,7 @@ LANES = 4  # numbers of a vector: columns of propagators are filled up to whole 
 
 
 def scratch(
-    states: int, harmonics: int, n_modes: int, n_indicators: int, n_outputs: int, n_rows: int, apart: bool = False
+    states: int, harmonics: int, n_modes: int, n_indicators: int, n_outputs: int, n_rows: int, *, apart: bool = False
 ) -> tuple[Tables, Work]:
     """Tables and working memory for one thread, in one block.
 

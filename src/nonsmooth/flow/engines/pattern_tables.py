@@ -5,13 +5,11 @@ Each parameter point has tables of its own, and numbers its patterns as they com
 
 from __future__ import annotations
 
-import threading
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Points, State
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.kernels.hybrid.codes import DEAD_END, FIRED, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
@@ -30,16 +28,6 @@ MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
 
 
-@dataclass
-class Points:
-    """Parameter points, and for each thread the tables of the one that it is at."""
-
-    points: FloatArray
-    linear: Form
-    period: FloatArray
-    local: threading.local = field(default_factory=threading.local)
-
-
 class PatternTables:
     """The tables of one parameter point: those of the patterns that were visited there, and room for more."""
 
@@ -52,9 +40,9 @@ class PatternTables:
         self.harmonics = (width - n - 1) // 2
         self.stand = linear_module().stand
         self.points, self.period = tables.points[i : i + 1], tables.period[i : i + 1]
-        self.omega = np.ascontiguousarray(tables.linear.omega[i : i + 1])
-        self.multiples = tables.linear.multiples
-        self.own_outputs = self._outputs(tables.linear, i)
+        self.omega = np.ascontiguousarray(tables.form.omega[i : i + 1])
+        self.multiples = tables.form.multiples
+        self.own_outputs = self._outputs(tables.form, i)
         self.index: dict[Pattern, int] = {}
         self.numbers: list[int] = []  # of the patterns here among all that were visited
         self.waiting: dict[Pattern, list[int]] = {}

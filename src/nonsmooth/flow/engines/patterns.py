@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Changes, FloatArray, KernelMarch, State, TrajectoryLog
+from nonsmooth.flow.engines.engine import Changes, FloatArray, KernelMarch, Points, State, TrajectoryLog
 from nonsmooth.flow.engines.loop import Engine
-from nonsmooth.flow.engines.pattern_tables import PatternTables, Points
+from nonsmooth.flow.engines.pattern_tables import PatternTables
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 
@@ -34,8 +34,8 @@ class PatternEngine(Engine):
     name: str = "exact"
 
     def prepare(self, points: FloatArray) -> Points:
-        linear = self.patterns.form.evaluate(points)
-        return Points(np.asarray(points, dtype=float), linear, linear.period)
+        form = self.patterns.form.evaluate(points)
+        return Points(np.asarray(points, dtype=float), form.period, form)
 
     def module(self) -> ModuleType:
         from nonsmooth.kernels.compile.assembly import linear_module

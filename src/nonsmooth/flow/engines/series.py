@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.flow.engines.engine import FloatArray, Points
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
 from nonsmooth.kernels.hybrid.codes import LENGTH, METHODS
@@ -144,17 +144,17 @@ class SeriesEngine(Engine):
     def step_in(self, mode: int, system: Any) -> float:
         return float(system[3].memo[LENGTH])
 
-    def prepare(self, points: FloatArray) -> SeriesPoints:
+    def prepare(self, points: FloatArray) -> Points:
         """Periods at the parameter points (P, n_parameters)."""
         points = np.ascontiguousarray(points, dtype=float)
-        return SeriesPoints(points, periods(self.traced, points))
+        return Points(points, periods(self.traced, points))
 
     def module(self) -> ModuleType:
         from nonsmooth.kernels.compile.assembly import series_module
 
         return series_module()
 
-    def given(self, tables: SeriesPoints) -> tuple[Any, Any, Any]:
+    def given(self, tables: Points) -> tuple[Any, Any, Any]:
         local = self._threads
         if getattr(local, "tables", None) is not tables or local.maps != len(self.net.changed):
             local.tables, local.generated, local.maps = tables, self.generated(tables), len(self.net.changed)
@@ -165,7 +165,7 @@ class SeriesEngine(Engine):
     def touches_of_a_leg(self) -> int:
         return (len(self.net.rows) + 1) * (self.series_order + 1)
 
-    def generated(self, tables: SeriesPoints) -> Any:
+    def generated(self, tables: Points) -> Any:
         """Record that stands for system and method in the kernels (``kernels.records.Generated``)."""
         from nonsmooth.kernels.hybrid.records import Generated
 
@@ -208,14 +208,6 @@ class SeriesEngine(Engine):
         rows = len(traced.u) + len(traced.indicators) + len(traced.outputs) + self.layers.count
         sizes = (len(traced.u), len(traced.indicators), rows, len(traced.mode_names), len(self.net.rows))
         return work_of(*sizes, len(traced.p), len(traced.m), self.series_order, self.model.n_scratch)
-
-
-@dataclass(frozen=True)
-class SeriesPoints:
-    """Result of ``prepare`` for P points; read only, shared by threads."""
-
-    points: FloatArray  # (P, n_parameters)
-    period: FloatArray  # (P,), inf where autonomous
 
 
 def work_of(

@@ -31,19 +31,6 @@ ROUNDING = 1e-12  # of the terms of an effect: below it there is none
 OFF = 1e-7  # of numbers, to see their sizes
 
 
-class Ahead(ABC):
-    """Derivatives behind an instant, of one order after the other."""
-
-    @abstractmethod
-    def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The next derivatives of the rates without forces of this order, the sums of their absolute terms, and the
-        derivatives of the laws."""
-
-    @abstractmethod
-    def put(self, forces: FloatArray) -> None:
-        """Put in the forces of this order, and go on to the next."""
-
-
 class Numbers(ABC):
     """Values at one instant; ``u`` are the states there, which impulses change."""
 
@@ -141,7 +128,7 @@ class RowNumbers(Numbers):
         return _RowsAhead(self, some, forces, laws)
 
 
-class _RowsAhead(Ahead):
+class _RowsAhead:
     """Derivatives of rows: each is a product with the matrix of the flow."""
 
     def __init__(self, here: RowNumbers, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> None:
@@ -155,11 +142,14 @@ class _RowsAhead(Ahead):
         self.laws = np.array([here.row(law) for law in laws]).reshape(len(laws), len(here.w))
 
     def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The next derivatives of the rates without forces of this order, the sums of their absolute terms, and the
+        derivatives of the laws."""
         laws = self.laws @ self.w
         self.w, self.size = self._onward(self.field, self.w), self._onward(np.abs(self.field), self.size, 1.0)
         return self.rows @ self.w, np.abs(self.rows) @ self.size, laws
 
     def put(self, forces: FloatArray) -> None:
+        """Put in the forces of this order, and go on to the next."""
         self.w[: self.n] += forces @ self.directions
         self.size[: self.n] += np.abs(forces) @ np.abs(self.directions)
 
@@ -298,7 +288,7 @@ class SeriesNumbers(Numbers):
         return _SeriesAhead(self, steps, len(some), len(laws))
 
 
-class _SeriesAhead(Ahead):
+class _SeriesAhead:
     """Taylor coefficients: the k-th derivative is k! times the k-th of them, in forces, rates and bounds alike."""
 
     def __init__(self, here: SeriesNumbers, steps: tuple[Any, Any], count: int, laws: int) -> None:
@@ -329,6 +319,9 @@ class _SeriesAhead(Ahead):
                     names[f"c{j}"] = names["C"][j, self.order] = force
             exec(self.steps[self.order > 0], names)
         return lanes
+
+
+Ahead = _RowsAhead | _SeriesAhead  # derivatives behind an instant, of one order after the other
 
 
 @cache

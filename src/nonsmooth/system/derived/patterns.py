@@ -377,7 +377,7 @@ class Patterns:
     def forces(self, parameters: FloatArray, time: FloatArray, u: FloatArray, mode: Any) -> FloatArray:
         """Forces (N, elements) at N samples, each in the pattern of its mode."""
         rows = self.rows_at(parameters)
-        w = rows.augmented_all(u, time)
+        w = rows.augmented(u, time)
         found = np.zeros((len(time), len(self.elements)))
         for m in np.unique(mode):
             here, pattern = np.flatnonzero(mode == m), self.visited[int(m)]

@@ -114,16 +114,11 @@ class Rows(Assembler):
             self.known, self.ways, self._flows = dict(self.known), dict(self.ways), dict(self._flows)
             self.__dict__["_kept"] = dict(self.__dict__.get("_kept", {}))
 
-    def augmented(self, u: FloatArray, time: float) -> FloatArray:
-        """w of states at a time."""
-        angles = self.rates * time
-        return np.concatenate([u, [1.0], np.stack([np.cos(angles), np.sin(angles)], axis=-1).ravel()])
-
-    def augmented_all(self, u: FloatArray, time: FloatArray) -> FloatArray:
-        """w of states at N times."""
-        angles = time[:, None] * self.rates
-        waves = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(len(time), -1)
-        return np.hstack([u, np.ones((len(time), 1)), waves])
+    def augmented(self, u: FloatArray, time: Any) -> FloatArray:
+        """w of states at a time, or at several; of one state at several too."""
+        angles, shape = np.multiply.outer(time, self.rates), np.shape(time)
+        waves = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(*shape, 2 * len(self.rates))
+        return np.concatenate([np.broadcast_to(u, (*shape, u.shape[-1])), np.ones((*shape, 1)), waves], axis=-1)
 
     def _part(self, k: int, name: str, patterns: Patterns) -> Part:
         direction = np.zeros(self.n, dtype=self.field.dtype)

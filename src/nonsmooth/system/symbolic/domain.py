@@ -141,10 +141,8 @@ class Domain:
         rules |= {(phase, "phase"): owner for owner, phase in phases.items()}
         self._rules = rules | {(expression, "apart"): message for expression, message in apart}
         used = set[sp.Basic]().union(*(expression.free_symbols for expression, _ in self._rules))
-        self._traced, self._used = (
-            traced,
-            {name for p, name in zip(traced.p, traced.parameter_names, strict=True) if p in used},
-        )
+        names = zip(traced.p, traced.parameter_names, strict=True)
+        self._traced, self._used = traced, {name for symbol, name in names if symbol in used}
 
     def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None) -> None:
         """Raise SystemDefinitionError where ``values`` are not allowed, of which some have ``changed``."""
