@@ -52,7 +52,7 @@ class VariationalFlow:
         self.n_active, self.n_p = len(active), len(traced.p)
         self.scale = np.concatenate([scale, np.ones(len(traced.m))])
         self._local = threading.local()
-        self._touches: dict[tuple[int, int], Any] = {}
+        self._made: dict[tuple[int, int], Any] = {}
         self._no_timing = np.zeros(self.n_active)
         self._take(traced)
 
@@ -210,16 +210,16 @@ class VariationalFlow:
 
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
         """Indicator ``i`` at (t, z) with its first two derivatives along the flow of ``mode``, and gradients of all."""
-        if (i, mode) not in self._touches:
+        if (i, mode) not in self._made:
             now = self.traced
             orders = [now.indicators[i]]
             for _ in range(2):
                 orders.append(along(orders[-1], now.t, now.u, now.fields[mode]))
             variables = (*now.u, *now.m, now.t, *self.symbols)
-            self._touches[i, mode] = numeric(now, tuple(orders), variables, quick=True)
+            self._made[i, mode] = numeric(now, tuple(orders), variables, quick=True)
         numbers = np.asarray(z, dtype=float).tolist()
         n, n_u = self.n, self.n_u
-        found = self._touches[i, mode](np.asarray(values).tolist(), float(t), numbers[:n_u], numbers[n_u:])
+        found = self._made[i, mode](np.asarray(values).tolist(), float(t), numbers[:n_u], numbers[n_u:])
         parts: list[Any] = []
         for row in np.array(found).reshape(3, -1):
             parts += [float(row[0]), row[1 : 1 + n], float(row[1 + n]), row[2 + n :]]
@@ -230,18 +230,20 @@ class VariationalFlow:
         at = self.traced.transitions[k].at
         if isinstance(at, int | float):
             return float(at), self._no_timing
-        return self._of_parameters(at, values)
+        return self._of_parameters(k, at, values)
 
     def period(self, values: Any) -> tuple[float, FloatArray]:
         """Forcing period T and dT/dp (n_active,); infinite and zeros where there is none."""
         if self.traced.period is None:
             return np.inf, self._no_timing
-        return self._of_parameters(self.traced.period, values)
+        return self._of_parameters(-1, self.traced.period, values)
 
-    def _of_parameters(self, expression: Any, values: Any) -> tuple[float, FloatArray]:
+    def _of_parameters(self, key: int, expression: Any, values: Any) -> tuple[float, FloatArray]:
         """An expression of parameters, and its derivatives in the active ones."""
-        found = numeric(self.traced, (expression,), self.symbols, quick=True)(np.asarray(values, dtype=float).tolist())
-        return float(found[0]), np.array(found[1:])
+        if (key, -1) not in self._made:
+            self._made[key, -1] = numeric(self.traced, (expression,), self.symbols, quick=True)
+        found = self._made[key, -1](np.asarray(values, dtype=float).tolist())
+        return found[0], np.array(found[1:])
 
     @property
     def n_moving(self) -> int:

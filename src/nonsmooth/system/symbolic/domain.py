@@ -8,8 +8,10 @@ of one another. Anything else needs ``period=``, which is checked against the eq
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -140,26 +142,42 @@ class Domain:
         rules |= {} if period is None else {(period, "period"): ""}
         rules |= {(phase, "phase"): owner for owner, phase in phases.items()}
         self._rules = rules | {(expression, "apart"): message for expression, message in apart}
-        used = set[sp.Basic]().union(*(expression.free_symbols for expression, _ in self._rules))
+        self._expressions = tuple(expression for expression, _ in self._rules)
+        self._allows = [_RULES[kind][0] for _, kind in self._rules]
+        used = set[sp.Basic]().union(*(expression.free_symbols for expression in self._expressions))
         names = zip(traced.p, traced.parameter_names, strict=True)
         self._traced, self._used = traced, {name for symbol, name in names if symbol in used}
 
+    @cached_property
+    def _at_one(self) -> Callable[[list[float]], list[float]]:
+        return numeric(self._traced, self._expressions, quick=True)
+
     def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None) -> None:
         """Raise SystemDefinitionError where ``values`` are not allowed, of which some have ``changed``."""
-        if changed is None or not self._used.isdisjoint(changed):
-            self.check_points(np.array([[values[name] for name in self._traced.parameter_names]]))
+        if changed is not None and self._used.isdisjoint(changed):
+            return
+        point = [values[name] for name in self._traced.parameter_names]
+        try:
+            found = zip(self._at_one(point), self._allows, strict=True)
+            fine = all(math.isfinite(number) and allows(number) for number, allows in found)
+        except (ArithmeticError, ValueError, TypeError):  # or a power is complex
+            fine = False
+        if not fine:
+            self.check_points(np.array([point]))
 
     def check_points(self, points: np.ndarray) -> None:
         """Check rows of parameter values (P, n_parameters), all points of a sweep or a chart, in one go."""
-        numbers = numeric(self._traced, tuple(expression for expression, _ in self._rules))(points)
-        for ((expression, kind), owner), column in zip(self._rules.items(), numbers.T, strict=True):
-            allows, says = _RULES[kind]
+        numbers = numeric(self._traced, self._expressions)(points)
+        for ((expression, kind), owner), allows, column in zip(
+            self._rules.items(), self._allows, numbers.T, strict=True
+        ):
             refused = ~(np.isfinite(column) & allows(column))
             if refused.any():
                 i = int(refused.argmax())
                 values = zip(self._traced.p, self._traced.parameter_names, points[i].tolist(), strict=True)
                 given = ", ".join(f"{name} = {value!r}" for p, name, value in values if p in expression.free_symbols)
                 text = expression.subs({s: sp.Symbol(n) for s, n in self._traced.named().items()})
+                says = _RULES[kind][1]
                 raise SystemDefinitionError(says.format(given=given, owner=owner, text=text, number=column[i]))
 
 
