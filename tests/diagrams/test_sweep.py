@@ -510,3 +510,49 @@ def test_transitions_are_counted_over_whole_cycles() -> None:
         orbit = ns.find_orbit(system.with_parameters(rho=value), period_number=int(number), progress=False)
         assert crossings == pytest.approx(len(orbit.signature.visits) - 1, abs=1e-12)
     np.testing.assert_allclose(numbers[:2], numbers[2:], atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_the_clearance_of_two_stops_is_what_is_left_to_each(method: str) -> None:
+    """x = X cos(w t - phi) between -2 and 1, also where other motions of the same system have met the stops."""
+    stop, w = ns.elements.Stop, np.array([2.0, 2.2])
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 2.0, "f": 1.0},
+        forcing={"q": lambda t, p: p.f * np.cos(p.w * t)},
+        elements={
+            "floor": stop(at="q", side=-1, position=-2.0, restitution=0.5),
+            "wall": stop(at="q", position=1.0, restitution=0.5),
+        },
+    )
+    X = 1 / np.hypot(1 - w**2, 0.1 * w)
+    for meets in (False, True):
+        if meets:
+            hit = ns.sweep(system.with_parameters(f=9.0), "w", w, method=method, **QUIET)
+            assert (hit["contacts_per_period"] > 0).all() and np.allclose(hit["clearance"].sel(indicator="wall_gap"), 0)
+        swept = ns.sweep(system, "w", w, method=method, **QUIET)
+        assert swept["clearance"].sel(indicator="floor_gap").values == pytest.approx(2 - X, abs=1e-8)
+        assert swept["clearance"].sel(indicator="wall_gap").values == pytest.approx(1 - X, abs=1e-8)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_clearance_of_what_is_not_asked_in_some_modes(method: str) -> None:
+    """A spring with play that is met on one side: its other end stays away by as much as the motion does."""
+    system = ns.mechanical(
+        1.0,
+        0.2,
+        1.0,
+        parameters={"w": 1.0},
+        forcing={"q": lambda t, p: 0.3 + 0.25 * np.cos(p.w * t)},
+        elements={
+            "play": ns.elements.Backlash(at="q", half_width=0.275, stiffness=5.0),
+            "rail": ns.elements.Coulomb(at="q", friction=0.05),
+            "plate": ns.elements.Stop(at="q", side=-1, position=-1.0, restitution=0.5),
+        },
+    )
+    swept = ns.sweep(system, "w", [1.0, 1.1], start={"q": 0.1}, method=method, **QUIET)
+    lowest, clearance = swept["minimum"].sel(state="q").values, swept["clearance"]
+    assert (clearance.sel(indicator="play_upper") < 0).all()
+    assert clearance.sel(indicator="play_lower").values == pytest.approx(lowest + 0.275, abs=1e-7)

@@ -467,3 +467,46 @@ def test_a_run_that_pauses_goes_on_where_it_stood(method: str, monkeypatch: pyte
     monkeypatch.setattr(engine, "PATIENCE", 30)
     for one, two in zip(whole, runs(), strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("method", ["rkf45", "taylor", "exact"])
+@pytest.mark.parametrize("load", [0.33, 0.303])
+def test_what_sticks_under_a_load_leaves_at_its_limit(method: str, load: float) -> None:
+    """States that stand still have no error, however long the step: the load is followed all the same."""
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 1.7},
+        forcing={"q": lambda t, p: load * np.cos(p.w * t + 1.0)},
+        elements={"rail": ns.elements.Coulomb(at="q", friction=0.3)},
+        scale={"q": 1e-3, "v_q": 1e-3},
+    )
+    run = ns.simulate(system, duration=9.0, start={"q": 0.0}, method=method)
+    held = [system.modes[jump.source] == "rail_stick" for jump in system.transitions]
+    leaves = np.array(held)[run.crossing_transition.values]
+    t, q = run.crossing_time.values[leaves], run.u_before.sel(state="q").values[leaves]
+    assert len(t) == 5 and np.diff(t).min() > 1.0
+    np.testing.assert_allclose(np.abs(load * np.cos(1.7 * t + 1.0) - q), 0.3, rtol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["rkf45", "taylor", "exact"])
+def test_a_wall_that_moves_faster_than_the_mass_is_met(method: str) -> None:
+    """A free mass at 0.1 t before a wall at 1 + 0.5 cos(20 t): the first zero of their distance."""
+    system = ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        parameters={"w": 20.0},
+        forcing={"q": lambda t, p: 0.0 * p.w},
+        elements={
+            "wall": ns.elements.Stop(at="q", position=lambda t, u, p: 1 + 0.5 * np.cos(p.w * t), restitution=0.5)
+        },
+    )
+    t = np.linspace(0.0, 6.0, 600_001)
+    first = t[np.argmax(1 + 0.5 * np.cos(20 * t) < 0.1 * t)]
+    run = ns.simulate(system, duration=6.0, start=[0.0, 0.1], method=method)
+    assert float(run.crossing_time[0]) == pytest.approx(first, abs=2e-5)
+    assert float(run.crossing_time[0]) * 0.1 == pytest.approx(
+        1 + 0.5 * np.cos(20 * float(run.crossing_time[0])), abs=1e-8
+    )

@@ -386,3 +386,28 @@ def test_a_method_that_is_asked_for_is_the_one_that_runs(method: str) -> None:
     run = ns.simulate(mass, duration=20.0, start={"x": 1.0}, samples=101, method=method, rtol=1e-4)
     error = np.abs(run["u"].sel(state="x").values - np.cos(run["time"].values)).max()
     assert 1e-9 < error < 1e-2
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+@pytest.mark.parametrize("begin", [0.2, 0.21])
+def test_a_log_that_is_full_while_elements_are_asked_goes_on(method: str, begin: float) -> None:
+    """Ten transitions a cycle, four of them at one instant: a thousand in one run are those of ten runs."""
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 1.0},
+        forcing={"q": lambda t, p: 2.0 * np.cos(p.w * t)},
+        elements={
+            "rail": ns.elements.Coulomb(at="q", friction=0.2),
+            "soft": ns.elements.ElasticStop(at="q", position=0.5, stiffness=20.0, damping=0.2),
+            "wall": ns.elements.Stop(at="q", position=0.5, restitution=0.8),
+        },
+    )
+    whole = ns.simulate(system, periods=160, start=[begin, 0.0], samples=2, method=method)
+    part, times = [begin, 0.0], []
+    for k in range(10):
+        part = ns.simulate(system, periods=16, start=part, samples=2, method=method)
+        times += list(part.crossing_time.values + (32 * np.pi * k - float(part.time[0])))
+    assert len(times) == whole.sizes["crossing"] > 1000
+    np.testing.assert_allclose(whole.crossing_time, times, atol=1e-8)

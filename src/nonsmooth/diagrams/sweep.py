@@ -289,7 +289,7 @@ class _Sweep:
             ends = [n, n + len(traced.indicators)]
             high, low = (np.split(whole(gather(f"kept.{end}")), ends, axis=-1) for end in ("high", "low"))
             arrays["maximum"], arrays["minimum"] = high[0], low[0]
-            arrays["clearance"] = np.where(armed_signs(traced) > 0, -high[1], low[1])
+            arrays["clearance"] = np.where(armed_signs(traced, self.points[0]) > 0, -high[1], low[1])
             if system.outputs:
                 unknown = out_of_bounds(traced, self.points, high[2], low[2]) | np.isinf(high[2])
                 arrays["output_maximum"], arrays["output_minimum"] = (
@@ -318,10 +318,11 @@ class _Sweep:
         )
 
 
-def armed_signs(traced: Traced) -> np.ndarray:
-    """+1 or -1 for each indicator: the sign with which it first stands in a transition (+1 where in none)."""
+def armed_signs(traced: Traced, values: np.ndarray) -> np.ndarray:
+    """+1 or -1 for each indicator: the sign with which it first stands in a transition (+1 where in none); of modes
+    that are made when they are visited in any way out of a contact state, whatever was visited."""
     signs = np.ones(len(traced.indicators), dtype=np.int64)
-    for jump in reversed(traced.transitions):
-        for row in reversed(jump.rows):
-            signs[row.indicator] = row.sign
+    rows = [row for jump in traced.transitions for row in jump.rows]
+    for row in reversed(rows if traced.patterns is None else traced.patterns.armed(values)):
+        signs[row.indicator] = row.sign
     return signs

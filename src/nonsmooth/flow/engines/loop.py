@@ -105,8 +105,8 @@ class Engine(ABC):
 
         What elements decide together is asked here (:mod:`nonsmooth.system.derived.deciding`)."""
         waits = int(system[3].tally[WAITS]) - 1
-        if waits < 0 or self.traced.decider is None:
-            return False
+        if waits < 0 or self.traced.decider is None or system[1].transitions[waits, 0] >= 0:
+            return False  # nothing is asked, or it has been answered and the run has paused for another reason
         taken = self._answer(waits, tables, march, system)
         if taken >= len(self.net.transitions):
             self.traced = self.traced.decider.known()

@@ -91,12 +91,11 @@ class PatternTables:
         """Make the mode for which a run waits, or say where what it has asked leads."""
         tally = self.work.tally
         waits = int(tally[WAITS]) - 1
-        if waits < 0:
+        if waits < 0 or self.transitions[waits, 0] >= 0:  # answered: the run has paused for another reason
             return
         lead, rows, mode = self.leads[waits], self.rows, self.patterns.mode
         if lead.kind in ("", ALONE):
-            if self.transitions[waits, 0] < 0:
-                self.add(lead.target)
+            self.add(lead.target)
             return
         w, here = rows.augmented(self.work.w[: rows.n], float(self.work.memo[TIME])), int(tally[MODE])
         pattern = self.patterns.visited[self.numbers[here]]

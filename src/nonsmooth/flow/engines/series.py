@@ -90,9 +90,11 @@ class SeriesEngine(Engine):
 
     @cached_property
     def kinds(self) -> Any:
-        """Per row of the jets: 1 it has a polynomial, 0 an output with a corner, -1 - s it repeats the state s."""
+        """Per row of the jets: 1 it has a polynomial, 2 one that is zero where it is not asked for, 0 an output with a
+        corner, -1 - s it repeats the state s."""
         traced = self.traced
         kinds = np.ones(len(traced.u) + len(traced.indicators) + len(traced.outputs), dtype=np.int64)
+        kinds[len(traced.u) :] = 1 if traced.decider is None else 2
         kinds[len(traced.u) + len(traced.indicators) :] = self.smooth_outputs
         for row, state in self.repeats.items():
             kinds[row] = -1 - state

@@ -120,7 +120,7 @@ class Generated(NamedTuple):
     points: Any  # (P, parameters)
     period: Any  # (P,), inf where nothing depends on time
     lacking: Any  # (modes, n) 1: a state that the mode has not
-    kinds: Any  # (rows,) of the jets: 1 a polynomial, 0 an output with a corner, -1 - s: it repeats state s
+    kinds: Any  # (rows,) of the jets: 1 a polynomial, 2 one that may not be asked for, 0 a corner, -1 - s: state s
     weight: Any  # (n,) atol / rtol
     absolute: Any  # (n,) atol
     rtol: Any

@@ -90,6 +90,13 @@ def hermite(J0, J1, rows, h, C):
 
 
 @inline
+def middle(J0, J1, row, h):
+    """The value of a row's quintic in the middle of the step."""
+    slopes, bends = J0[row, 1] - J1[row, 1], J0[row, 2] + J1[row, 2]
+    return 0.5 * (J0[row, 0] + J1[row, 0]) + h * (5.0 / 32.0 * slopes + h / 32.0 * bends)
+
+
+@inline
 def _certain(J0, J1, row, sign, h, error):
     """-1: sign * row certainly <= 0 on the step, 1: certainly > 0, 0: undecided (Bernstein form of the quintic)."""
     b0, b5 = sign * J0[row, 0], sign * J1[row, 0]

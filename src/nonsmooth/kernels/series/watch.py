@@ -31,9 +31,11 @@ def widen(a, b, form, tables, work, kept):
     C, n, mode, poly, top, bottom = work.C, work.w.shape[0], work.tally[MODE], work.a, kept.high, kept.low
     m = degree_of(form)
     for row in range(form.kinds.shape[0]):
-        if form.kinds[row] != 1 or (row < n and form.lacking[mode, row] == 1):
+        if form.kinds[row] < 1 or (row < n and form.lacking[mode, row] == 1):
             continue
         _, low, high = row_bounds(C, row, 1.0, m, work.powers)
+        if form.kinds[row] == 2 and low == high == 0.0:
+            continue
         if high > top[row]:
             top[row] = largest(poly, load(C, row, 1.0, m, work.powers, poly), top[row], work.stack)
         if low < bottom[row]:

@@ -169,6 +169,15 @@ class Patterns:
         rows.ways[key] = outs, conditions, armed([way[0] for way in ways])
         return outs, conditions, rows.ways[key][2]
 
+    def armed(self, values: FloatArray) -> list[TracedCondition]:
+        """The conditions of all ways out of the contact states of each element, at given parameters."""
+        rows, found, size = self.rows_at(values), list[TracedCondition](), len(self.elements)
+        for k, element in enumerate(self.elements.values()):
+            for phase in range(len(element.phases)):
+                for way in self.ways_of(rows, (*(0,) * k, phase, *(0,) * (size - k - 1)), k)[0]:
+                    found += way.rows
+        return found
+
     def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], Conditions]:
         """The rows (conditions, M) of a pattern, NaN where one is not asked for; the ways out; the conditions at which
         elements meet what they may be held by."""
