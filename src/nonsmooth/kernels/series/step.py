@@ -14,6 +14,7 @@ from nonsmooth.kernels.series.polynomial import NONE
 from nonsmooth.kernels.series.rkf45 import first_step, hermite, middle, quiet, stages, time_to_transition
 from nonsmooth.kernels.series.taylor import dense_states, fill_powers, step_length, trusted
 
+BETWEEN = 1e3  # times the tolerance: so far conditions may be off between the ends of a step, of their terms
 LEAST_STEP = 1e-3  # of a step's own length: what indicators do in less may be rounding, and so no crossing
 
 
@@ -147,7 +148,10 @@ def between(mode, t, h, n, form, work):
     for i in range(form.indicators):
         row = n + i
         if J0[row, 0] != 0.0 or J0[row, 1] != 0.0 or J1[row, 0] != 0.0:  # else not asked, or kept at zero
-            size = form.rtol * max(work.scale[i], fabs(J1[row, 0]))
+            size = max(
+                work.scale[i], fabs(J1[row, 0]), h * fabs(J0[row, 1]), h * fabs(J1[row, 1]), h * h * fabs(J0[row, 2])
+            )
+            size *= BETWEEN * form.rtol
             worst = max(worst, fabs(vals[i] - middle(J0, J1, row, h)) / size if size > 0.0 else 0.0)
     return worst * worst
 
