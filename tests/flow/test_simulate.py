@@ -411,3 +411,24 @@ def test_a_log_that_is_full_while_elements_are_asked_goes_on(method: str, begin:
         times += list(part.crossing_time.values + (32 * np.pi * k - float(part.time[0])))
     assert len(times) == whole.sizes["crossing"] > 1000
     np.testing.assert_allclose(whole.crossing_time, times, atol=1e-8)
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
+@pytest.mark.parametrize("at", [0.0, 0.3])
+def test_a_kick_at_the_end_of_a_run_is_in_it_whatever_rounding_says(method: str, at: float) -> None:
+    """The instants of both are sums of different numbers, of which either may be the smaller by its last digit."""
+    system = ns.System(
+        states=["x", "v"],
+        parameters={"w": 1.0},
+        modes={"free": lambda t, u, p: [u.v, -0.3 * u.v - 4.0 * u.x]},
+        transitions=[ns.Transition("free", "free", at=at, reset=lambda t, u, p: [u.x, u.v + 0.5])],
+        elements={"soft": ns.elements.ElasticStop(gap=lambda t, u, p: 0.12 - u.x, on={"v": -1.0}, stiffness=30.0)},
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    random = np.random.default_rng(1)
+    for w, n in zip(random.uniform(0.5, 2.0, 40), random.integers(1, 7, 40), strict=True):
+        until = float(n + at) * 2 * np.pi / w
+        run = ns.simulate(system.with_parameters(w=w), duration=until, start=[0.05, 0.0], method=method)
+        assert run["crossing_time"].values[-1] == pytest.approx(until, abs=1e-9)
+        assert (run["u_after"] - run["u_before"]).values[-1] == pytest.approx([0.0, 0.5])

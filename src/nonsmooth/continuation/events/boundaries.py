@@ -109,9 +109,7 @@ class Crossed(Boundary):
             for r, row in enumerate(shooting.system.traced.transitions[k].rows):
                 one = shooting.flow.jump(point.values, k, t, z, r)
                 size = max(float(np.abs(one.h_z) @ point.curve.size), 1e-300)
-                near.append(
-                    (max(abs(one.h) / size, ON), len(near), row.indicator)
-                )  # of several that are zero the first
+                near.append((max(abs(one.h) / size, ON), len(near), row.indicator))
         return min((one for one in near if one[-1] != fires), default=(0.0, -1, -1))[-1]
 
     def instant(self, point: Any) -> tuple[int, float, Any]:

@@ -25,6 +25,7 @@ from nonsmooth.kernels.hybrid.codes import (
     CLOSELY,
     DEAD_END,
     DIVERGED,
+    DONE,
     FIRED,
     FIRST,
     GOES_ON,
@@ -52,6 +53,7 @@ from nonsmooth.kernels.hybrid.codes import (
     WAITS,
 )
 
+AT_ONE_INSTANT = 1e-14  # of the time of a run
 MAY_WAIT = 1  # 0 where nothing is made or asked on the way, as on a GPU: what never happens costs nothing
 
 
@@ -264,6 +266,8 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
             if not strides:
                 stop, timed = next_stop(i, form, net, section, goal, work)
             wait, rest = stop - memo[TIME], remaining(section, goal, seen, work)
+            if abs(rest - wait) <= AT_ONE_INSTANT * (abs(memo[DONE]) + rest):
+                rest = wait  # an end and a stop are one instant, whichever is the first by rounding
             step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, first)
             if not step >= 0.0:
                 code = DIVERGED

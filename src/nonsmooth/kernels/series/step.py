@@ -167,7 +167,8 @@ def runge_kutta(form, work, h, shortest):
         j += 1
         if j >= n:
             break
-    jet, aside = jet_of(form), inf
+    jet = jet_of(form)
+    aside = inf
     while True:
         error = stages(field, mode, t, work.w, work.q, h, n, K, form.step <= 0.0, form.absolute, form.rtol)
         if form.step > 0.0 or error <= 1.0:

@@ -111,6 +111,8 @@ class Scalar(np.lib.mixins.NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """Apply a NumPy function of symbolic scalars, element by element where an input is an array."""
         function = _UFUNCS.get(ufunc.__name__)
+        if kwargs.keys() == {"out"} and kwargs["out"] == inputs[:1] and isinstance(inputs[0], Scalar):
+            kwargs = {}  # `a += b`: a number is not changed, a new one takes its name
         if function is None or method != "__call__" or kwargs:
             options = f" with {method}" if method != "__call__" else f" with {', '.join(kwargs)}=" if kwargs else ""
             raise SystemDefinitionError(

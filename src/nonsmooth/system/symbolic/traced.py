@@ -156,8 +156,10 @@ class Traced:
 
     def alike(self, k: int, row: int) -> list[int]:
         """Transitions that lead to the same mode by the same map as transition ``k`` where the same row fires: their
-        conditions are parts of one."""
+        conditions are parts of one. Where a question leads is not known: it is like no other."""
         jump, known = self.transitions[k], self.patterns.changes if self.patterns else []
+        if jump.kind in (ASKED, TOGETHER):
+            return [k]
         asked = jump.source, jump.target, jump.kind, jump.reset, jump.writes
         return [
             j
