@@ -34,6 +34,18 @@ def matrix_of_state(t, u, p):
     return A @ u + 0.5 * u - u / 3
 
 
+def parameter_times_state(t, u, p):
+    return A @ (p.k * u) - u / p.m
+
+
+def in_place(t, u, p):
+    force = -p.k * u.x
+    force += p.rho * u.v
+    force -= 2.0 * t
+    force *= p.c
+    return u.v, force
+
+
 def by_name(t, u, p):
     return {"v": (p.rho * np.cos(p.omega * t) - 2 * p.k * u.x - p.c * u.v) / p.m, "x": u.v}
 
@@ -74,7 +86,19 @@ def make(field, **more):
 
 @pytest.mark.parametrize(
     "field",
-    [unpacked, by_name, matrix, matrix_of_state, indexed, numpy_scalars, functions, array_functions, negated],
+    [
+        unpacked,
+        by_name,
+        matrix,
+        matrix_of_state,
+        parameter_times_state,
+        in_place,
+        indexed,
+        numpy_scalars,
+        functions,
+        array_functions,
+        negated,
+    ],
     ids=lambda f: f.__name__,
 )
 def test_the_expressions_compute_what_the_function_computes(field):

@@ -279,9 +279,13 @@ class Finding:
     @classmethod
     def from_record(cls, record: Mapping[str, Any]) -> Finding:
         """Return the finding of such a record; a number may be a text there, as ``"inf"``."""
+
+        def estimate(one: Any) -> Estimate:  # a list in the first files
+            return Estimate(**one) if isinstance(one, Mapping) else Estimate(*one)
+
         read = {
-            "estimate": Estimate(**record["estimate"]),
-            "others": {name: Estimate(**one) for name, one in record["others"].items()},
+            "estimate": estimate(record["estimate"]),
+            "others": {name: estimate(one) for name, one in record["others"].items()},
             **{name: tuple(record[name]) for name in ("runs", "notes")},
         }
         return cls(**{**record, **read})

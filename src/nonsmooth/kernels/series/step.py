@@ -174,7 +174,8 @@ def runge_kutta(form, work, h, shortest):
         if form.step > 0.0 or error <= 1.0:
             jet(mode, 2, t + h, K[7], work.q, work.J1, work.W)
             missed = between(mode, t, h, n, form, work) if form.step <= 0.0 else 0.0
-            if not 1.0 < missed < 0.5 * aside or h <= 1e6 * shortest:  # what does not fall with the step is rounding
+            # What does not fall with the step is rounding, and so is what happens in one as short as the clock's own.
+            if not 1.0 < missed < 0.5 * aside or h <= 1e6 * shortest:
                 return h, max(error, missed) if missed <= 1.0 else error
             error = aside = missed
         h *= max(0.2, 0.9 * error**-0.1) if error < inf else 0.1

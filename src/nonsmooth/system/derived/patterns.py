@@ -171,12 +171,10 @@ class Patterns:
 
     def armed(self, values: FloatArray) -> list[TracedCondition]:
         """The conditions of all ways out of the contact states of each element, at given parameters."""
-        rows, found, size = self.rows_at(values), list[TracedCondition](), len(self.elements)
-        for k, element in enumerate(self.elements.values()):
-            for phase in range(len(element.phases)):
-                for way in self.ways_of(rows, (*(0,) * k, phase, *(0,) * (size - k - 1)), k)[0]:
-                    found += way.rows
-        return found
+        rows, first = self.rows_at(values), [0] * len(self.elements)
+        every = [(k, phase) for k, one in enumerate(self.elements.values()) for phase in range(len(one.phases))]
+        ways = [self.ways_of(rows, (*first[:k], phase, *first[k + 1 :]), k)[0] for k, phase in every]
+        return [row for some in ways for way in some for row in way.rows]
 
     def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], Conditions]:
         """The rows (conditions, M) of a pattern, NaN where one is not asked for; the ways out; the conditions at which

@@ -111,8 +111,10 @@ class Scalar(np.lib.mixins.NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """Apply a NumPy function of symbolic scalars, element by element where an input is an array."""
         function = _UFUNCS.get(ufunc.__name__)
-        if kwargs.keys() == {"out"} and kwargs["out"] == inputs[:1] and isinstance(inputs[0], Scalar):
+        if kwargs.keys() == {"out"} and isinstance(inputs[0], Scalar) and kwargs["out"][0] is inputs[0]:
             kwargs = {}  # `a += b`: a number is not changed, a new one takes its name
+        if any(isinstance(item, np.lib.mixins.NDArrayOperatorsMixin) and type(item) is not Scalar for item in inputs):
+            return NotImplemented  # the whole state answers for both
         if function is None or method != "__call__" or kwargs:
             options = f" with {method}" if method != "__call__" else f" with {', '.join(kwargs)}=" if kwargs else ""
             raise SystemDefinitionError(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.finding import Estimate
+from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth_savi2007.identification.adjustment import Observation, adjust
 
@@ -118,6 +118,16 @@ def test_a_parameter_set_goes_through_a_file_and_draws_what_it_says(tmp_path):
     assert np.log(drawn["c_s"]).std() == pytest.approx(0.2 / 0.6, rel=0.03)
     assert np.corrcoef(drawn["k"], np.log(drawn["c_s"]))[0, 1] == pytest.approx(0.004 / (0.1 * 0.2), abs=0.03)
     assert list(given.covariance["parameter"].values) == ["k", "c_s"]
+
+
+def test_findings_are_read_as_files_hold_them_and_as_the_first_files_did():
+    import json
+
+    given = Finding("k", Estimate(8.0, np.inf, "N/m", 0.1), "m", 3, ("a",), ("n",), {"c": Estimate(0.6, 0.2)})
+    record = json.loads(json.dumps(given.to_record()))
+    lists = {"estimate": [8.0, "inf", "N/m", 0.1, False], "others": {"c": [0.6, 0.2, "", 0.0, False]}}
+    for one in (record, record | lists):
+        assert vars(Finding.from_record(one)) == vars(given)
 
 
 def test_a_parameter_set_goes_into_a_system():
