@@ -83,29 +83,30 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
     seen: dict[str, str] = {}
     extremes = {f"{o}_{which}": o for o in groups.get("output", ()) for which in ("maximum", "minimum")}
     for what, names in groups.items():
+        one = f"{'an' if what[0] in 'aeiou' else 'a'} {what}"
         for name in names:
             if not isinstance(name, str):
-                raise SystemDefinitionError(f"{system!r}: the name of a {what} must be a string, not {name!r}")
+                raise SystemDefinitionError(f"{system!r}: the name of {one} must be a string, not {name!r}")
             if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
                 hint = f"; try {name}_" if keyword.iskeyword(name) else ""
                 raise SystemDefinitionError(
-                    f"{system!r}: {name!r} cannot name a {what}: it must be a Python identifier that is no keyword "
+                    f"{system!r}: {name!r} cannot name {one}: it must be a Python identifier that is no keyword "
                     f"and does not begin with an underscore{hint}"
                 )
             if (read := unicodedata.normalize("NFKC", name)) != name:
                 letters = ", ".join(unicodedata.name(a, "?") for a in name if a not in read)
                 raise SystemDefinitionError(
-                    f"{system!r}: {name!r} cannot name a {what}: it holds {letters}, and in code Python reads the name "
+                    f"{system!r}: {name!r} cannot name {one}: it holds {letters}, and in code Python reads the name "
                     f"as {read!r} (p.{name} is p.{read}). Name it {read!r}, or in plain letters (mu)"
                 )
             if name in RESERVED:
                 raise SystemDefinitionError(
-                    f"{system!r}: {name!r} cannot name a {what}: the results use this name themselves; "
+                    f"{system!r}: {name!r} cannot name {one}: the results use this name themselves; "
                     f"try {name}_ or {what}_{name}. Reserved: {', '.join(sorted(RESERVED))}"
                 )
             if name in extremes:
                 raise SystemDefinitionError(
-                    f"{system!r}: {name!r} cannot name a {what}: a sweep gives this name to an extreme of the output "
+                    f"{system!r}: {name!r} cannot name {one}: a sweep gives this name to an extreme of the output "
                     f"{extremes[name]!r}; try {name}_ or {what}_{name}"
                 )
             if name in seen:

@@ -14,9 +14,10 @@ from nonsmooth.blas import one_blas_thread
 from nonsmooth.errors import SolveError, check_keys
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.fit.beginnings import beginnings, drawn
+from nonsmooth.identification.fit.beside import looked_beside
 from nonsmooth.identification.fit.first_level import Stage, level, read_modes, without_disagreeing
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, states_from_samples
-from nonsmooth.identification.fit.growth import Grown, grow, with_steady
+from nonsmooth.identification.fit.growth import Grown, finished, grow, with_steady
 from nonsmooth.identification.fit.likelihood import posterior_of
 from nonsmooth.identification.fit.motion import Marcher
 from nonsmooth.identification.fit.outcome import outcome
@@ -269,6 +270,7 @@ def best_of(
     if best is None:
         assert why is not None
         raise SolveError(_NONE.format(tries=tries, why=why))
+    best = looked_beside(best, lambda stage: finished(stage, problem.noise))
     return with_steady(both, best.theta, best) if both.steady else best
 
 

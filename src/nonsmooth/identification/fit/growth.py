@@ -21,6 +21,7 @@ from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.steady import ROUNDING
 from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.recordings.signals.spectrum import correlation_times
 
 POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
 _CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
@@ -28,6 +29,9 @@ _REGULAR = 10.0  # that growth, below which a motion is regular enough to be fol
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
 _NEAR = 0.6  # residuals of a guess over the readings' own size, up to which the longest windows are fitted from it
+_QUIET = 0.5  # residuals of the first windows over irregularity, from which these are the noise
+_CHANCE = 1e-6  # that short windows fit so much better by chance
+_EXACT = 1e-4  # of the noise squared: residuals of short windows that are those of the arithmetic
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
@@ -50,6 +54,8 @@ class Grown(Stage):
         Whether longer windows did not fit though neighbouring motions do not separate fast.
     begins : tuple of (int, int, float)
         Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
+    doubted : tuple of int
+        Unknowns along which the sum of squares is no parabola.
     """
 
     short: float
@@ -58,6 +64,7 @@ class Grown(Stage):
     missing: bool = False
     stuck: bool = False
     begins: tuple[tuple[int, int, float], ...] = ()
+    doubted: tuple[int, ...] = ()
 
     @property
     def readings(self) -> int:
@@ -87,7 +94,15 @@ class Grown(Stage):
     @property
     def rank(self) -> tuple[bool, bool, bool, float]:
         """Order of fits, the better one first."""
-        return self.unused > 0, self.stuck, self.short > SHORT, self.rms
+        return self.unused > 0, self.stuck, self.short > SHORT, self._unlikely
+
+    @property
+    def _unlikely(self) -> float:
+        """Minus the logarithm of the likelihood, for each reading."""
+        counts = np.array([len(window.readings[0]) for window in self.problem.pieces])
+        of = np.concatenate([window.readings[1] for window in self.problem.pieces])
+        own = self.problem.noise * np.sqrt(1.0 - self.problem.colour**2)
+        return float(np.mean(np.log(own[of])) + 0.5 * self.misfits @ counts / counts.sum())
 
     @property
     def good(self) -> bool:
@@ -119,9 +134,14 @@ def grow(
     """
     near = _at_once(problem, theta, start, free, longest)
     if near is not None:
-        told()
-        return near
+        if not _opens(near, length, start, free):
+            told()
+            return near
+        theta = near.theta
     stage = settle_first(problem, theta, length, start, free)
+    quiet = np.minimum(problem.noise, _noise(stage.problem, stage.state))
+    if (quiet < _QUIET * problem.noise).any():  # few samples a swing: their irregularity was the motion's
+        stage = settle_first(replace(problem, noise=quiet), stage.theta, length, start, free)
     told()
     wide, poor, stuck = length, _reduced(stage) > POOR, False
     while not poor and len(stage.problem.pieces) > len(problem.records) and wide < longest:
@@ -135,7 +155,13 @@ def grow(
             stuck = _spreads(stage) < _REGULAR
             break
     rounds = 2 if poor else _ROUNDS
-    return replace(_begun(_final(stage, problem.noise, rounds), problem.noise, rounds), stuck=stuck)
+    found = replace(finished(stage, problem.noise, rounds), stuck=stuck)
+    return found if near is None or found.rank < near.rank else near
+
+
+def finished(stage: Stage, irregular: FloatArray, rounds: int = _ROUNDS) -> Grown:
+    """The fit at its minimum, with the noise from its residuals, each record in the mode in which it fits best."""
+    return _begun(_final(stage, irregular, rounds), irregular, rounds)
 
 
 def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free: bool, longest: float) -> Grown | None:
@@ -152,10 +178,31 @@ def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free
         found = level(stage)
         if _reduced(found) > 2.0 * _GOOD**2:
             return None
-        final = _begun(_final(found, problem.noise, _ROUNDS), problem.noise, _ROUNDS)
+        final = finished(found, problem.noise)
     except SolveError:
         return None
     return final if final.good and _spreads(found) < _CHAOS else None
+
+
+def _opens(whole: Grown, length: float, start: FloatArray | None, free: bool) -> bool:
+    """Return whether short windows with starts of their own fit better than noise allows (F-test of nested models):
+    then the sum of squares over long ones has another minimum, or the model lacks a part."""
+    from scipy.stats import f
+
+    plain = whole.problem.plain
+    now = plain.of(first_windows(plain, whole.theta, length, start, free))
+    try:
+        opened = level(Stage(now, whole.theta, now.starts))
+    except SolveError:
+        return False
+    closed = Stage(plain, whole.theta, whole.starts)
+    (few, total), (many, all_) = _freedom(now), _freedom(plain)
+    if total != all_ or not many > few:
+        return False
+    shared = [correlation_times(np.concatenate(parts(now, opened.state, c))) for c in range(len(now.sensors))]
+    least = max(_reduced(opened), _EXACT)
+    gained = (_reduced(closed) * many - _reduced(opened) * few) / (many - few)
+    return bool(f.sf(gained / least / max(shared), many - few, few) < _CHANCE)
 
 
 def _longer_windows(stage: Stage, length: float) -> Stage | None:
@@ -249,7 +296,7 @@ def with_steady(problem: Windows, theta: FloatArray, grown: Grown | None = None)
     if grown is not None:
         now, starts = replace(grown.problem, steady=problem.steady), grown.starts
     final = _final(level(Stage(now, theta, starts)), problem.noise, _ROUNDS)
-    return final if grown is None else replace(final, stuck=grown.stuck, begins=grown.begins)
+    return final if grown is None else replace(final, stuck=grown.stuck, begins=grown.begins, doubted=grown.doubted)
 
 
 def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:

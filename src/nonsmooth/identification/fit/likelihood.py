@@ -32,8 +32,7 @@ def limits_of(values: FloatArray, rise: FloatArray, best: float, *, level: float
     return first_zero(values[middle::-1], beyond[middle::-1]), first_zero(values[middle:], beyond[middle:])
 
 
-_STEP = 0.5  # of a standard uncertainty
-_STEPS = 16  # on either side, at most
+_AWAY = (*np.arange(0.5, 4.5, 0.5), *(4.0 + 2.0 ** np.arange(8)))  # standard uncertainties, on either side, at most
 _HIGH = 5.0  # rise of chi^2 beyond which no limit at 95 % lies
 PROFILED = (
     "profile likelihood: the unknown is held while all others and the starts follow; the limits are where chi^2, over "
@@ -83,8 +82,8 @@ def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, 
     problem, u = grown.problem, grown.problem.unknowns
     theta, starts, least = grown.theta, grown.starts, problem.cost(grown.theta, grown.starts)
     rows: list[tuple[float, float]] = []
-    for k in range(1, _STEPS + 1):
-        value = grown.theta[i] + k * _STEP * step
+    for far in _AWAY:
+        value = grown.theta[i] + far * step
         if not u.low[i] <= value <= u.high[i]:
             break
         theta = np.where(np.arange(len(theta)) == i, value, theta)

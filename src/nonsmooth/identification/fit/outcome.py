@@ -67,6 +67,12 @@ def outcome(
     for i in {*loose, *lost.tolist()}:
         covariance[i] = covariance[:, i] = 0.0
         covariance[i, i] = np.inf
+    known = [i for i in range(m) if np.isfinite(covariance[i, i])]
+    asked = [u.names[i] for i in known if u.names[i] in profiles or i in grown.doubted]
+    profile = profiled(grown, asked, found.normal + u.precision, found.covariance, synthetic, watched)
+    doubted = {i: one for i, one in zip(map(u.names.index, asked), profile, strict=True) if i in grown.doubted}
+    for i, one in doubted.items():
+        _widen(covariance, i, one)
     told = {name: (v, unit) for name, v, unit in zip(u.names, theta, u.units, strict=True)} | starts
     rows = [Estimate(v, np.sqrt(covariance[i, i]), unit) for i, (v, unit) in enumerate(told.values())]
     found_of = list(zip(told, rows, strict=True))
@@ -78,8 +84,7 @@ def outcome(
         steady = steady_data(grown, options).assign_attrs(mark)
         beside = [_of_steady(grown, steady, rows[0]), *beside]
         samples += steady.sizes["sample"]
-    known = [name for name in profiles if np.isfinite(rows[u.names.index(name)].uncertainty)]
-    beside = [*profiled(grown, known, found.normal + u.precision, found.covariance, synthetic, watched), *beside]
+    beside = [*profile, *beside]
     notes = [*left, *(_notes(grown, found, data) if data is not None else [])]
     notes += [note for finding in beside for note in finding.notes]
     finding = Finding(
@@ -97,11 +102,30 @@ def outcome(
         covariance,
         extra=extra,
         findings=[finding, *beside],
-        identifiability=_sentences(grown, covariance[:m, :m], loose, samples),
+        identifiability=_sentences(grown, covariance[:m, :m], loose, samples)
+        | {
+            one.name.removesuffix(", profile"): one.notes[0].partition(": ")[2] + "; its sum of squares is no parabola"
+            for one in doubted.values()
+        },
         notes=notes,
         anomalies=[*_anomalies(grown, data), *_far_off(grown)],
         synthetic=synthetic,
     )
+
+
+def _widen(covariance: FloatArray, i: int, profile: Finding) -> None:
+    """Widen the uncertainty of an unknown to the limits of its profile; infinite where the profile does not end."""
+    data = profile.data
+    assert data is not None
+    within = profile.estimate.interval()
+    far = max(float(profile.value - data["low"]), float(data["high"] - profile.value))
+    if np.isfinite(float(data["low"] + data["high"])):
+        factor = max(1.0, far / (within[1] - profile.value))
+        covariance[i] *= factor
+        covariance[:, i] *= factor
+    else:
+        covariance[i] = covariance[:, i] = 0.0
+        covariance[i, i] = np.inf
 
 
 def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]], list[FloatArray], FloatArray]:
