@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
+from nonsmooth.results.labels import in_words
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +81,21 @@ def test_the_parameters_and_points_that_are_not_known(struck) -> None:
     assert not found.isel(w=0).any()
     assert found.isel(w=slice(1, None)).all()
     assert found.attrs["unknown"] == 4
+
+
+def test_a_period_number_is_known_where_a_run_tells_it() -> None:
+    """Of a linear oscillator: with c < 0 it grows without bound, with c = 0 it has two frequencies and never a period
+    (one of the two is 0.618 of the other, or 0.7: back to 4e-3 after ten periods), with c > 0 period 1."""
+    rig = ns.mechanical(1.0, "c", 1.0, forcing={"q": lambda t, p: np.cos(p.w * t)}, parameters={"c": 0.1, "w": 1.0})
+    chart = ns.chart(rig, {"c": [-0.5, 0.0, 0.5], "w": [0.61803398875, 0.7]}, transient=100, progress=False)
+    told = in_words(chart["status"])
+    assert told[0].tolist() == ["diverged"] * 2 and told[1, 0] == "not_periodic" and told[1, 1] == "slow"
+    none = ns.region(chart, "period_number == 0")
+    assert none.values.tolist() == [[False, False], [True, False], [False, False]] and none.attrs["unknown"] == 3
+    assert ns.region(chart, "period_number < 2").values.tolist() == [[False, False], [True, False], [True, True]]
+    attractors = xr.Dataset({"period_number": (("g", "attractor"), [[1, -1], [0, 2]])}, {"g": [0.0, 1.0]})
+    found = ns.region(attractors, "period_number < 2")
+    assert found.values.tolist() == [[True, False], [True, False]] and found.attrs["unknown"] == 1
 
 
 def test_a_run_by_its_values(forced) -> None:

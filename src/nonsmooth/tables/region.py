@@ -15,6 +15,7 @@ import sympy as sp
 import xarray as xr
 
 from nonsmooth.errors import shortened
+from nonsmooth.results.labels import by_name
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.symbolic.expressions import read_expression
 from nonsmooth.tables.quantities import dataset_of, quantities_of, quantity
@@ -101,7 +102,12 @@ _Ends = tuple[Any, ...]
 
 def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Ends:
     if name in known or name in data.coords:
-        return (quantity(data, name, known),)
+        one = quantity(data, name, known)
+        if name != "period_number":
+            return (one,)
+        # It is -1 of an attractor that is not there, and 0 of a run that failed or had not settled too.
+        never = data["status"] == by_name("not_periodic").code if "status" in data else True
+        return (one.where((one > 0) | (one == 0) & never),)
     stems = [name] if f"{name}_maximum" in known else []
     if not stems and name in _OF_ELEMENTS:
         found = (re.fullmatch(rf"(.+_{name})(?:_maximum)?", key) for key in known)

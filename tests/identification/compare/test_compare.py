@@ -306,3 +306,32 @@ def test_a_unit_that_differs_is_said(what: str, theirs: str, ours: str) -> None:
         compare(measured, system, parameter="w")
     with pytest.warns(UserWarning, match=said):
         assert ns.fit(system, measured, ["c"], measured="x")["c"] == pytest.approx(0.15, rel=1e-6)
+
+
+def test_a_mass_that_stands_still_adds_its_noise() -> None:
+    """Friction holds the second mass; of N passes its mean is off by 1 / sqrt(N) of its noise, in two of four states:
+    the distance is sqrt(2 / (4 N)). In units of the noise's own mean it was 1 for any N."""
+    rig = ns.mechanical(
+        np.eye(2),
+        0.2 * np.eye(2),
+        np.eye(2) + 0.1 * np.array([[1.0, -1.0], [-1.0, 1.0]]),
+        parameters={"w": 1.4},
+        forcing={"q1": lambda t, p: np.cos(p.w * t)},
+        elements={"held": ns.elements.Coulomb(at="q2", friction=1.0)},
+    )
+    passes, period = 49, rig.period()
+    time = np.arange(60 * 128, (60 + passes) * 128 + 1) * period / 128
+    run = ns.simulate(rig, duration=time[-1], samples=time)
+    u = run["u"].values[np.searchsorted(run["time"].values, time)]
+    assert (u[:, [1, 3]] == 0.0).all() and np.ptp(u[:, 0]) > 1.0
+    u = u + 1e-6 * np.random.default_rng(3).normal(size=u.shape)
+    noisy = xr.Dataset(
+        {
+            "u": (("time", "state"), u),
+            "u_error": (("time", "state"), np.full(u.shape, 1e-6)),
+            "phase": ("time", time / period),
+        },
+        {"time": time, "state": list(rig.states)},
+    )
+    found = compare(noisy, rig)
+    assert float(found["orbit_distance"]) == pytest.approx(np.sqrt(2 / (4 * passes)), rel=0.15)

@@ -57,7 +57,7 @@ def compare_motion(
     variables |= _periods(number, predicted, returns[0], scale, model.states)
     if motions is not None and sorted(model.places) == list(range(len(motions.system.states))):
         predicted = _begun_with_the_measurement(motions, folded, number, predicted)
-    variables |= _orbits(folded, number, predicted, model.grid)
+    variables |= _orbits(folded, number, predicted, model)
     if model.system is not None and model.draws:
         assert predicted.attractor is not None  # a System's prediction has one
         systems, drawn = model.drawn()
@@ -194,9 +194,10 @@ def _shown(folded: FloatArray) -> FloatArray:
     return folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
 
 
-def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid: int) -> dict[str, Any]:
+def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, model: Model) -> dict[str, Any]:
     if folded is None or predicted.orbit is None:
         return {}
+    grid = model.grid
     closed = number > 0 and predicted.period_number > 0
     distances = (np.nan, np.nan, np.nan)
     scatter = None
@@ -205,7 +206,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
         mean, spread = mean_orbit(folded, number)
         a, scatter = common_length(mean, number, length), common_length(spread, number, length)
         b = common_length(predicted.orbit, predicted.period_number, length)
-        found = orbit_distance(a, b, length)
+        found = orbit_distance(a, b, length, model.noise)
         b = np.roll(b, found.whole_shift * grid, axis=0) if found.whole_shift else b
         distances = (found.distance, found.any_phase, found.phase_shift)
     else:
@@ -262,9 +263,9 @@ def motion_band(
         length = 0 if closed is None else len(closed[0]) // model.grid
         if closed is not None and one.period_number and length % one.period_number == 0:
             motion = common_length(motions.orbit(i, one.point, one.period_number), one.period_number, length)
-            motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * model.grid, axis=0)
-            orbits.append(motion)
-            to_measured[i] = orbit_distance(closed[0], motion, length).distance
+            shift = orbit_distance(closed[1], motion, length, model.noise).whole_shift
+            orbits.append(np.roll(motion, shift * model.grid, axis=0))
+            to_measured[i] = orbit_distance(closed[0], motion, length, model.noise).distance
     variables = {
         "draw_period_number": labelled("draw", numbers, "period number for drawn parameters"),
         "draw_energy_distance": labelled(

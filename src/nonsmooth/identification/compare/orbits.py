@@ -5,7 +5,7 @@ between samples each state is interpolated by the cubic through the four samples
 motion is smooth, and a kink that an impact leaves reaches no further than two samples.
 
 Two orbits are given on equal grids of phase, over the same whole number of forcing periods. With s_i the root mean
-square size of state i about its mean (of both orbits together),
+square size of state i about its mean (of both orbits together), or its noise where that is larger,
 
 .. math:: d(\delta)^2 = \frac1n \sum_i \Big\langle \frac{(a_i(\varphi) - b_i(\varphi - \delta))^2}{s_i^2} \Big\rangle
 
@@ -119,9 +119,9 @@ class OrbitDistance(NamedTuple):
     phase_shift: float
 
 
-def orbit_distance(x: FloatArray, y: FloatArray, periods: int) -> OrbitDistance:
+def orbit_distance(x: FloatArray, y: FloatArray, periods: int, noise: ArrayLike = 0.0) -> OrbitDistance:
     """Normalised distance of two orbits, each (periods * grid, states) on equal grids of phase."""
-    size = np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0)))
+    size = np.maximum(np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0))), noise)
     size = np.where(size > 0, size, 1.0)
     n, states = x.shape
     fx, fy = np.fft.fft(x / size, axis=0) / n, np.fft.fft(y / size, axis=0) / n
