@@ -82,6 +82,44 @@ def test_the_phases_of_one_element_are_shaded() -> None:
         assert (covered == (x > 0.5))[clear].all()
 
 
+@pytest.fixture(scope="module")
+def preloaded():
+    """Two masses, a preloaded spring, an elastic stop and friction: modes with long names."""
+    return ns.mechanical(
+        np.eye(2),
+        0.1 * np.eye(2),
+        [[3.0, -1.0], [-1.0, 2.0]],
+        parameters={"w": 1.0},
+        forcing={"q1": lambda t, p: 2.0 * np.cos(p.w * t)},
+        elements={
+            "preloaded_spring": ns.elements.PreloadedSpring(at="q1", preload=0.3, stiffness=1.0),
+            "elastic_stop_on_the_right": ns.elements.ElasticStop(at="q2", position=0.4, stiffness=1.0),
+            "rail": ns.elements.Coulomb(at="q2", friction=0.05),
+        },
+    )
+
+
+def test_a_preloaded_spring_is_no_contact_that_closes(preloaded) -> None:
+    """It is above or below at any instant; shaded is where the second mass is beyond its stop."""
+    run = ns.simulate(preloaded, periods=2, transient=20)
+    middle = 0.5 * (run.time.values[1:] + run.time.values[:-1])
+    beyond = np.interp(middle, run.time.values, run.u.sel(state="q2").values) - 0.4
+    (shaded,) = ns.plot.time_history(run).collections
+    ends = [path.vertices[:, 0] for path in shaded.get_paths()]
+    covered = np.any([(one.min() < middle) & (middle < one.max()) for one in ends], axis=0)
+    clear = np.abs(beyond) > 1e-2
+    assert (covered == (beyond > 0))[clear].all() and 0 < covered.mean() < 0.5
+
+
+def test_a_legend_of_long_names_stays_in_the_figure(preloaded) -> None:
+    ax = ns.plot.orbit(ns.find_orbit(preloaded))
+    ax.figure.draw_without_rendering()
+    box, whole = ax.get_legend().get_window_extent(), ax.figure.bbox
+    assert len(ax.get_legend().get_texts()) > 4
+    assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and box.y1 <= whole.y1
+    assert ax.get_window_extent().width > 0.7 * whole.width
+
+
 def test_labels_of_jumps_do_not_stand_over_each_other() -> None:
     """Three jumps at nearly one place: the labels would lie on each other."""
     response = ns.frequency_response(

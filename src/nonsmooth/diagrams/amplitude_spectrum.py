@@ -179,7 +179,7 @@ def _dataset(
     from nonsmooth.results.schema import parameter_coords, state_coords
 
     labels = labels_of(system)
-    per = "per iterate" if labels.is_map else "Hz" if labels.time_unit == "s" else f"1/{labels.time_unit}"
+    per = "per iterate" if labels.is_map else "Hz" if labels.time_unit == "s" else "1"
     return with_short_record(
         xr.Dataset(
             {

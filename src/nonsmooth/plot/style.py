@@ -291,7 +291,8 @@ def even_dots(legend: Legend) -> None:
 
 
 def clear_legend(ax: Axes) -> Legend:
-    """Place the legend in the axes where it covers nothing, else above them; call it when all is drawn."""
+    """Place the legend in the axes where it covers nothing, else above them, in one column where two would leave the
+    figure; call it when all is drawn."""
     legend = ax.legend(loc="best")
     whole: Any = ax.figure.canvas.figure  # of a figure within a figure too
     whole.draw_without_rendering()
@@ -302,7 +303,8 @@ def clear_legend(ax: Axes) -> Legend:
         if box.count_contains(path.vertices) or (
             joined and path.cleaned(remove_nans=True).intersects_bbox(box, filled=False)
         ):
-            return ax.legend(**ABOVE, ncols=2, columnspacing=1.0)
+            above = ax.legend(**ABOVE, ncols=2, columnspacing=1.0)
+            return ax.legend(**ABOVE) if above.get_window_extent().width > whole.bbox.width else above
     return legend
 
 

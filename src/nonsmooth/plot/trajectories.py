@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from nonsmooth.errors import unknown
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import Name, column, first_states, name_and_unit, name_axes, name_plane, variable_along
+from nonsmooth.plot.labels import (
+    Name,
+    column,
+    first_states,
+    in_lines,
+    name_and_unit,
+    name_axes,
+    name_plane,
+    variable_along,
+)
 from nonsmooth.results.labels import words_of_flags
 from nonsmooth.system.kinds import above
 
@@ -50,9 +59,6 @@ def time_history(ax: Axes, result: xr.Dataset, *, y: Name | None = None, shade: 
     name_plane(ax, result, "time", name)
 
 
-_CLOSED, _STUCK = {"rest", "contact", "above", "below"}, {"stick", "held"}  # phases of elements
-
-
 def _away(result: xr.Dataset, shade: bool | str) -> NDArray[np.bool_]:
     """The samples in another mode than the first, with a closed contact, or with an element in another phase."""
     mode = result["mode"]
@@ -71,9 +77,12 @@ def _away(result: xr.Dataset, shade: bool | str) -> NDArray[np.bool_]:
     several = [own for name in forces if all(own := phases(name))]
     if len(several) < 2:
         return np.asarray(mode.values > 0)
-    of = [set(now) for now in zip(*several, strict=True)]
-    wanted = _CLOSED if any(now & _CLOSED for now in of) else _STUCK
-    return np.array([bool(now & wanted) for now in of])[mode.values]
+    contacts = [own for own in several if {"open", "free"} & {*own}]  # a preloaded spring, above or below, is neither
+    for elements, wanted in ((contacts, {"rest", "contact", "above", "below"}), (several, {"stick", "held"})):
+        there = np.array([not wanted.isdisjoint(now) for now in zip(*elements, strict=True)])
+        if there.any():
+            break
+    return there[mode.values]
 
 
 @figure("simulate", "u", ratio=0.85)
@@ -108,7 +117,8 @@ def phase_portrait(
     modes = words_of_flags(result["mode"])
     for k, (xs, ys) in enumerate(pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)):
         if np.isfinite(xs).any():
-            ax.plot(xs, ys, color=palette.nth(k), label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
+            words = in_lines(modes[k].replace("_", " "), 60)  # of a legend's line
+            ax.plot(xs, ys, color=palette.nth(k), label=words, zorder=2 + 0.1 * k)
     if section is not None:
         variable_along(section, "section", "poincare or sweep")
         points = [column(section, "section", name).values.ravel() for name in names]
@@ -234,5 +244,5 @@ def amplitude_spectrum(
     ax.set_xlim(0.0, 1.02 * float(order[some].max(initial=1.0)))
     per, (symbol, unit) = result["base_frequency"].attrs["units"], name_and_unit(result, name)
     name_axes(ax, None, (f"amplitude of {symbol}", unit))
-    base = f"frequency / {float(result['base_frequency']):.4g} {per}"
+    base = f"frequency / {float(result['base_frequency']):.4g} {per.removesuffix('1')}".rstrip()
     ax.set_xlabel("frequency per iterate" if per == "per iterate" else base)
