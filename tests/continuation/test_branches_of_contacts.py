@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.optimize import brentq
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, PreloadedSpring, Stop
@@ -272,3 +273,32 @@ def test_a_preloaded_spring_has_the_special_points_of_two_plain_modes(far: bool)
         found.append(sorted(zip(at.tolist(), branch["special_kind"].values.tolist(), strict=True)))
     assert [kind for _, kind in found[0]] == [kind for _, kind in found[1]] == ["grazing", "grazing"]
     np.testing.assert_allclose([at for at, _ in found[1]], [at for at, _ in found[0]], rtol=0, atol=1e-9)
+
+
+def test_a_rubbing_mass_grazes_a_wall_once() -> None:
+    """Impacts below the creep speed that lift off again rebound as faster ones do: behind the graze no other special
+    point follows. It is where the motion without the wall reaches it."""
+    elements: dict[str, Any] = {"rub": Coulomb(at="q", friction=0.075)}
+
+    def model(**more: Any) -> ns.System:
+        return ns.mechanical(
+            1.0,
+            0.15,
+            2.0,
+            forcing={"q": lambda t, p: 0.27 * p.F * np.cos(1.85 * t)},
+            parameters={"F": 1.0},
+            elements=elements | more,
+        )
+
+    system, free = model(wall=Stop(at="q", position=0.4, restitution=0.6)), model()
+    assert system.traced.patterns is not None  # its modes are made when they are visited
+    branch = ns.continue_orbit(ns.find_orbit(system), "F", (0.8, 2.4))
+    special = ns.special_points(branch)
+    assert special["kind"].values.tolist() == ["grazing", "fold"]
+    assert len(set(branch["signature"].values.tolist())) == 2
+
+    def beyond(F: float) -> float:
+        run = ns.simulate(free.with_parameters(F=F), periods=2, transient=200)
+        return float(run["u"].sel(state="q").max()) - 0.4
+
+    assert float(special["F"][0]) == pytest.approx(brentq(beyond, 1.5, 2.4, xtol=1e-6), abs=2e-5)

@@ -38,7 +38,7 @@ Conditions = tuple[TracedCondition, ...]
 
 
 class Out(NamedTuple):
-    """The ``way``-th way of an element out of its phase, and its conditions by their numbers."""
+    """A way of an element out of its phase, and its conditions by their numbers; ``way``: the first of the same map."""
 
     element: int
     way: int
@@ -149,8 +149,7 @@ class Patterns:
         conditions at which it meets what it may be held by."""
         key = k, rows.phases(k, pattern)
         if key in rows.ways:
-            found: tuple[list[Out], dict[int, FloatArray], Conditions] = rows.ways[key]
-            return found
+            return rows.ways[key]
         name, conditions = rows.parts[k].name, {}
 
         def armed(some: Sequence[Any]) -> Conditions:
@@ -162,8 +161,9 @@ class Patterns:
                 found.append(TracedCondition(slot, one.sign, one.strict))
             return tuple(found)
 
-        leaving = enumerate(rows.leaving(k, self.mode, pattern))
-        outs = [Out(k, i, way, armed(way.conditions)) for i, way in leaving]
+        leaving = rows.leaving(k, self.mode, pattern)
+        maps = [id(way.states) for way in leaving]
+        outs = [Out(k, maps.index(id(way.states)), way, armed(way.conditions)) for way in leaving]
         here = rows.place(k, self.mode, pattern)
         ways = here.element.meeting(here) if here.phase not in here.element.held else []
         rows.ways[key] = outs, conditions, armed([way[0] for way in ways])

@@ -96,7 +96,8 @@ class Rows(Assembler):
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
-        self.ways: dict[tuple[int, Any], Any] = {}  # out of its phase, of each element in a combination of its group
+        # Out of its phase, of each element in a combination of its group.
+        self.ways: dict[tuple[int, Any], tuple[list[Any], dict[int, FloatArray], Any]] = {}
         self._flows: dict[tuple[int, Any], tuple[FloatArray, dict[int, Any]]] = {}
         self._room = ROOM
         self.still, self.turned = still, False  # all that they are made of but the frequency; whether that counts too
