@@ -166,3 +166,36 @@ def test_impact_oscillator_both_ways(omega: float, kind: str) -> None:
     orbit = ns.find_orbit(at, start=start, period_number=1, transient=0)
     back = ns.continue_orbit(orbit, "A", (0.1 * exact, 2 * exact))
     assert [value for _, value in table(back)] == pytest.approx([value for _, value in table(free)], abs=1e-9)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.05])
+def test_a_symmetric_motion_grazes_both_walls_all_along_its_curve(friction: float) -> None:
+    """A mass midway between two walls reaches both where its amplitude is 1: F = |1 - w^2 + i c w|; with friction the
+    curve of another law passes the grazes of branches."""
+    rubs = {"rub": ns.elements.Coulomb(at="q", friction=friction)} if friction else {}
+    walls = {
+        name: ns.elements.Stop(at="q", position=side, side=int(side), restitution=0.6)
+        for name, side in (("right", 1.0), ("left", -1.0))
+    }
+    rig = ns.mechanical(
+        1.0,
+        0.2,
+        1.0,
+        parameters={"F": 0.5, "w": 1.3},
+        forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+        elements=walls | rubs,
+    )
+
+    def graze(w: float) -> xr.Dataset:
+        branch = ns.continue_orbit(ns.find_orbit(rig.with_parameters(w=w)), "F", (0.3, 1.0))
+        special = ns.special_points(branch)
+        return special.isel(special=special["kind"].values.tolist().index("grazing"))
+
+    curve = ns.continue_curve(graze(1.3), {"F": (0.1, 1.5), "w": (0.9, 1.6)})
+    F, w = curve["F"].values, curve["w"].values
+    assert w.min() == pytest.approx(0.9) and F.max() == pytest.approx(1.5)  # two edges of the box
+    if friction:
+        nearest = int(np.abs(w - 1.15).argmin())
+        assert float(graze(float(w[nearest]))["F"]) == pytest.approx(F[nearest], rel=1e-7)
+    else:
+        assert pytest.approx(np.hypot(1 - w**2, 0.2 * w), rel=1e-10) == F
