@@ -7,6 +7,7 @@ import re
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.plot.labels import in_lines
@@ -89,8 +90,8 @@ def preloaded():
         np.eye(2),
         0.1 * np.eye(2),
         [[3.0, -1.0], [-1.0, 2.0]],
-        parameters={"w": 1.0},
-        forcing={"q1": lambda t, p: 2.0 * np.cos(p.w * t)},
+        parameters={"w": 1.0, "F": 2.0},
+        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
         elements={
             "preloaded_spring": ns.elements.PreloadedSpring(at="q1", preload=0.3, stiffness=1.0),
             "elastic_stop_on_the_right": ns.elements.ElasticStop(at="q2", position=0.4, stiffness=1.0),
@@ -209,3 +210,21 @@ def test_a_title_stands_above_what_a_figure_says_of_itself() -> None:
     ax.figure.draw_without_rendering()
     own, said = (text.get_window_extent() for text in (ax.title, ax._left_title))
     assert ax.get_title().strip() == "a safe region" and own.y1 > said.y1 and "\n" in ax.get_title()
+
+
+def test_a_branch_and_a_curve_of_one_point_are_dots(preloaded) -> None:
+    branch = ns.continue_orbit(ns.find_orbit(preloaded), "w", (0.99, 1.01)).isel(point=slice(0, 1))
+    curve = xr.Dataset({"kind": "grazing"}, {"a": ("point", [0.5]), "b": ("point", [2.0])})
+    curve = curve.assign(special_point=("special", np.zeros(0, int)), special_kind=("special", np.zeros(0, str)))
+    places = [(branch["w"].values[0], branch["section"].values[0, 0]), (0.5, 2.0)]
+    for ax, place in zip((ns.plot.branch(branch), ns.plot.curve(curve)), places, strict=True):
+        (line,) = ax.lines
+        assert line.get_xydata().tolist() == [list(map(float, place))]
+        assert line.get_marker() == "." and line.get_markevery() == [0]
+        assert len(ax.get_legend().get_texts()) == 1
+
+
+def test_contours_take_two_rows(preloaded) -> None:
+    chart = ns.chart(preloaded, {"w": [1.0, 1.1], "F": [1.0]}, progress=False)
+    with pytest.raises(ValueError, match="two values and more of each parameter"):
+        ns.plot.chart(chart, show="q1_maximum", contours={"q1_maximum": 0.5})

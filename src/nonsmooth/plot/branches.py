@@ -104,7 +104,7 @@ def draw_branch(
             looks = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5}
         for row in ordinates:
             label = style.once(ax, f"{_STATES[line]} branch")
-            ax.plot(with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
+            style.line(ax, with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
     if special and result.sizes.get("special", 0):
         _mark_special(ax, result, values, ordinates, MARKS)
     return name
@@ -153,6 +153,8 @@ def lines_of(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
     kind = np.where(result["stable"].values.astype(bool), 0, 1)
     if "virtual" in result:
         kind[result["virtual"].values.astype(bool)] = 2
+    if len(kind) == 1:
+        return [(list(_STATES)[kind[0]], np.zeros(1, int))]
     first, last = kind[:-1].copy(), kind[1:]
     if result.sizes.get("special", 0):
         at = result["special_point"].values.astype(int)
@@ -223,7 +225,7 @@ def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: Any = No
     over_chart = any(isinstance(item, QuadMesh) for item in ax.collections)
     looks: dict[str, Any] = {"path_effects": style.halo(1.8)} if over_chart else {}
     looks |= {"color": color or style.COLORS[shade], "linewidth": 1.0, "zorder": 3}
-    ax.plot(result[x].values, result[y].values, line, label=style.once(ax, words), **looks)
+    style.line(ax, result[x].values, result[y].values, line, label=style.once(ax, words), **looks)
     if special:
         _mark_special(ax, result, result[x].values, result[y].values[None], POINTS)
     name_plane(ax, result, x, y)

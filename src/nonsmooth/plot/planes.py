@@ -147,6 +147,8 @@ def _contours(ax: Axes, heights: xr.DataArray, levels: Any, name: str) -> None:
     """Lines of equal value, each with its value in the unit that suits it."""
     unit = str(heights.attrs.get("units", "1"))
     y, x = (heights[dim].values for dim in heights.dims)
+    if min(heights.shape) < 2:
+        raise ValueError(f"contours of {name} take two values and more of each parameter, not {dict(heights.sizes)}")
     found = ax.contour(
         x, y, heights.values.astype(float), levels, colors=style.COLORS["section"], linestyles="--", linewidths=0.8
     )
