@@ -225,6 +225,13 @@ class VariationalFlow:
             parts += [float(row[0]), row[1 : 1 + n], float(row[1 + n]), row[2 + n :]]
         return Touch(*parts)
 
+    def rates(self, values: Any, i: int, mode: int, order: int, t: FloatArray, z: FloatArray) -> tuple[FloatArray, ...]:
+        """Of an indicator's derivative of some order along the flow of a mode, at some points: its values (points,),
+        and its derivatives in the states, in time and in the active parameters."""
+        every = [self.indicator(values, i, mode, float(at), state) for at, state in zip(t, z, strict=True)]
+        name = ("h", "L", "L2")[order]
+        return tuple(np.array([getattr(one, name + of) for one in every]) for of in ("", "_z", "_t", "_p"))
+
     def phase(self, values: Any, k: int) -> tuple[float, FloatArray]:
         """Phase of the time-triggered transition k and its derivatives (n_active,) in the active parameters."""
         at = self.traced.transitions[k].at

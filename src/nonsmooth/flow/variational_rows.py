@@ -83,17 +83,28 @@ class RowsFlow(VariationalFlow):
         return known
 
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
+        found: list[Any] = []
+        for h, h_z, h_t, h_p in zip(*self._of_points(values, i, mode, np.array([t]), np.array([z])), strict=True):
+            found += [float(h[0]), h_z.copy(), float(h_t[0]), h_p[0]]
+        return Touch(*found)
+
+    def rates(self, values: Any, i: int, mode: int, order: int, t: FloatArray, z: FloatArray) -> tuple[FloatArray, ...]:
+        h, h_z, h_t, h_p = (one[order] for one in self._of_points(values, i, mode, t, z))
+        return h, np.broadcast_to(h_z, z.shape), h_t, h_p
+
+    def _of_points(self, values: Any, i: int, mode: int, t: FloatArray, z: FloatArray) -> tuple[FloatArray, ...]:
+        """A condition and its two derivatives along a mode's flow at some points: their values (3, points), gradients
+        (3, n) at all of them, derivatives in time (3, points) and in the active parameters (3, points, n_active)."""
         at, known = self._known(values)
         if (i, mode) not in known:
             known[i, mode] = self._along(*self._taken(at, i, mode))
         every, turning, rates = known[i, mode]
-        angles = rates * t
-        w = np.concatenate([z, [1.0], np.array([np.cos(angles), np.sin(angles)]).T.ravel()])
-        own, changing = every @ w, turning @ w
-        found: list[Any] = []
-        for h, row, turned in zip(own, every[:, 0, : self.n].copy(), changing, strict=True):
-            found += [float(h[0]), row, float(turned[0]), h[1:] + t * turned[1:]]
-        return Touch(*found)
+        n, angles = self.n, np.multiply.outer(t, rates)
+        w = np.ones((len(t), every.shape[-1]))
+        w[:, :n], w[:, n + 1 :: 2], w[:, n + 2 :: 2] = z, np.cos(angles), np.sin(angles)
+        own, changing = every @ w.T, turning @ w.T
+        slopes = own[:, 1:] + t * changing[:, 1:]
+        return own[:, 0], every[:, 0, :n], changing[:, 0], slopes.swapaxes(1, 2)
 
     def _along(self, rows: FloatArray, fields: FloatArray, rates: FloatArray) -> tuple[FloatArray, ...]:
         """The rows of a condition and of its two derivatives along the flow, and those derivatives in the active

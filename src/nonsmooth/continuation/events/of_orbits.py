@@ -67,7 +67,8 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
-NEARER = 60  # steps back to a boundary from the first orbit behind it, at most
+NEARER = 20  # steps back to a boundary from the first orbit behind it, at most
+REACH = 60.0  # times the first of them: as far in all
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -250,11 +251,13 @@ class AlongOrbits(Policy):
         found: list[Met] = []
         away, steep = abs(first.value - point.value) / first.curve.width, abs(first.rise)
         b, ds = first.turned(), 2.0 * away / steep if steep * FARTHEST > away else 0.0
-        numbers = [kind.number(b) for kind in self.kinds]
-        for _ in range(NEARER if ds else 0):
+        numbers, left, grows = [kind.number(b) for kind in self.kinds], REACH * ds, 2.0
+        for _ in range(NEARER):
+            if not left > 0.0:
+                break
             new = b.curve.step(b, ds)
             if new is None:  # no values beyond the boundary
-                ds *= 0.25
+                ds, grows = 0.25 * ds, 1.0
                 continue
             now = [kind.number(new) for kind in self.kinds]
             step = Step(b, new, (numbers, now), (b.curve.margins(b), b.curve.margins(new)), True)
@@ -264,7 +267,8 @@ class AlongOrbits(Policy):
             found += special_on(step, self.kinds)
             if ends != []:
                 return found, replace(ends[0], point=ends[0].point.turned()) if ends else None
-            b, numbers = new, now
+            b, numbers, left = new, now, left - ds
+            ds = min(grows * ds, left)
         return found, None
 
     def over(self, point: OrbitPoint) -> str | None:

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 
-LARGE = 64  # unknowns; beyond, the blocks of the visits fill a small part of the matrix
+LARGE = 256  # unknowns; beyond, the zeros between the blocks of the visits cost more than lists of what is none
+MANY = 100  # equations; beyond, all singular values take longer than the smallest
 
 
 def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
@@ -36,7 +37,7 @@ def null_vectors(matrix: FloatArray, tolerance: float) -> FloatArray:
     Of a large matrix three at most, the last the nearest to zero: by inverse iteration on
     :math:`J^T J + \\delta^2`, as the least squares that it stands for, whose matrix is as sparse as J.
     """
-    if len(matrix) <= LARGE:
+    if len(matrix) <= MANY:
         _, values, right = np.linalg.svd(matrix)
         return np.asarray(right[int((values > tolerance * values[0]).sum()) :])
     from scipy.sparse import bmat, eye_array

@@ -21,16 +21,15 @@ def mean_along(
     ``x`` holds the visit's begin, the state there, its length, and the active parameters."""
     nodes, weights = _gauss(order - 1)
     n, tau = len(flow.scale), nodes * x[flow.n + 1]
-    ends = flow.segments(values, np.full(NODES, mode), np.full(NODES, x[0]), tau, np.tile(x[1 : n + 1], (NODES, 1)))
-    earlier, mean, slopes = ends.start_time(), 0.0, np.zeros(len(x))
-    for i, weight in enumerate(weights):
-        at = flow.indicator(values, indicator, mode, x[0] + tau[i], ends.z[i])
-        g, g_z, g_t, g_p = (at.L, at.L_z, at.L_t, at.L_p) if order == 1 else (at.L2, at.L2_z, at.L2_t, at.L2_p)
-        mean += weight * g
-        slopes[0] += weight * (g_t + g_z @ earlier[i])
-        slopes[1 : n + 1] += weight * (g_z @ ends.Phi[i])
-        slopes[n + 1] += weight * nodes[i] * (g_t + g_z @ ends.f_end[i])
-        slopes[n + 2 :] += weight * (g_p + g_z @ ends.P[i])
+    start = np.broadcast_to(x[1 : n + 1], (NODES, n))
+    ends = flow.segments(values, np.full(NODES, mode), np.full(NODES, x[0]), tau, start)
+    g, g_z, g_t, g_p = flow.rates(values, indicator, mode, order, x[0] + tau, ends.z)
+    across = weights[:, None] * g_z
+    mean, slopes = float(weights @ g), np.empty(len(x))
+    slopes[0] = weights @ g_t + np.vdot(across, ends.start_time())
+    slopes[1 : n + 1] = across.ravel() @ ends.Phi.reshape(-1, n)
+    slopes[n + 1] = (weights * nodes) @ g_t + nodes @ (across * ends.f_end).sum(axis=1)
+    slopes[n + 2 :] = weights @ g_p + across.ravel() @ ends.P.reshape(NODES * n, -1)
     return mean, slopes
 
 
