@@ -112,6 +112,8 @@ class Page:
         channels = {name: json.loads(self.tab.evaluate(CHANNEL, name) or "null") for name in names}
         for passing in ("heard", "can", "tabs"):
             channels["ui"].pop(passing)
+        for hidden in ("chart", "basins"):  # legends of views that nobody sees there
+            channels["ui"]["legends"].pop(hidden)
         return {**channels, "open": self.tab.locator("dialog[open]").count(), "play": self.tab.inner_text("#play")}
 
     def readout(self) -> dict[str, str]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from tests.explorer.conftest import wait_until
+from tests.explorer.conftest import HEARD, wait_until
 
 import nonsmooth as ns
 from nonsmooth.explorer.measured import read, strand_distance
@@ -78,11 +78,10 @@ def test_a_dropped_recording_lies_over_the_model_and_its_parameters_are_found(pa
     assert "Angle is in rad, x in m: give the factor" in page.tab.inner_text("#recording-remarks")
     page.write("factor-x", repr(TRAVEL))
     page.until('document.getElementById("recording-remarks").textContent.includes("13 forcing periods compared")')
-    page.until_done()
     page.write("v-p.omega", "3.5")
-    page.until_done()
+    page.until(HEARD)
     page.tab.click("#recording-drive")  # the frequency of the record
-    page.until_done()
+    page.until(HEARD)
     assert page.value("omega") == pytest.approx(ns.models.discontinuous_support().values["omega"], rel=1e-4)
     page.tab.click("#undo")
     page.tab.click("#undo")

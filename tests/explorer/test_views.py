@@ -199,9 +199,13 @@ def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) ->
             }""",
             label,
         )
-        click(page, "basins", *place)
-        reached = sorted(data(page, "section points")["x"])
+        page.tab.mouse.click(*page.place("basins", *place))
         known = sorted(marks["x"][marks["marker"] == kind])
-        np.testing.assert_allclose(reached, known, rtol=1e-3)
+
+        def reached(known: list[float] = known) -> bool:  # while the basins still get finer
+            x = sorted(data(page, "section points")["x"])
+            return len(x) == len(known) and np.allclose(x, known, rtol=1e-3, atol=0.0)
+
+        wait_until(reached)
     assert "NaN" not in tip(page, "basins", *place, "period 2 (b)")
     page.picture("basins")
