@@ -53,9 +53,9 @@ def fitted_constants(runs):
 
 
 def test_noise_of_runs_of_different_rates_has_one_time():
-    """Noise that forgets within 0.2 s, read each 0.1 s and 0.02 s: errors of the mean over 40 draws are as said."""
+    """Noise that forgets within 0.2 s, read each 0.1 s and 0.02 s: errors of the mean over 24 draws are as said."""
     far, said = [], []
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         runs = [
             {f"y{k}": (np.arange(n) * h, 1.3 + 0.02 * autoregressive(n, np.exp(-h / 0.2), rng)) for k in range(8)}
@@ -64,7 +64,7 @@ def test_noise_of_runs_of_different_rates_has_one_time():
         found = fitted_constants(runs)
         far += [(found[name] - 1.3) / found.uncertainty[name] for name in found.uncertainty]
         said += [float(note.split("correlates by ")[1].split()[0]) for note in found.notes if "correlates by" in note]
-    assert len(far) == len(said) == 40 and np.mean(said) == pytest.approx(np.exp(-0.1), abs=0.02)
+    assert len(far) == len(said) == 24 and np.mean(said) == pytest.approx(np.exp(-0.1), abs=0.02)
     assert np.sqrt(np.mean(np.square(far))) < 1.25
 
 
@@ -119,6 +119,8 @@ def test_a_sensor_that_ends_is_said_and_taken_as_what_it_is():
     assert np.abs(far).max() < 3.5
     shown = right.residuals
     assert float(shown["fitted"].max()) <= limits[0] and float(shown["beyond"].max()) > 0
+    t, y = t[:150], y[:150]
+    count = int((y == limits[0]).sum())
     wrong = ns.fit(system, {"x": (t, y)}, find, progress=False, tries=1)
     assert any(f"{count} readings of x share its largest value" in one for one in wrong.anomalies)
 
