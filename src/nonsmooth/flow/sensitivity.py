@@ -65,7 +65,7 @@ class Variation:
         changes: tuple[FloatArray, IntArray],
     ) -> None:
         n, size = flow.n, flow.n + flow.n_active
-        first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
+        first = int(log.sample_mode[0]), np.concatenate([held(log.sample_u[0]), log.sample_memory[0]])
         flow.catch_up()
         self.start = settled(flow, values, start, first, t_begin)
         modes, starts, self.times, self.transitions, before = apart(flow, log, first, t_begin, changes)
@@ -88,11 +88,10 @@ class Variation:
         total = np.eye(size)
         if course is not None:
             total[:n, n:] = course.by_delays(flow, legs.f_begin[0])
-        products = []
-        for step in steps:
-            total = step @ total
-            products.append(total[:n])
-        self.D, self.rate = np.array(products)[is_sample], legs.f_end[is_sample]
+        products = np.empty_like(steps)
+        for step, product in zip(steps, products, strict=True):
+            total = step.dot(total, out=product)  # of small matrices three times as quick as @
+        self.D, self.rate = products[is_sample, :n], legs.f_end[is_sample]
         self.of_time = self.rate - self.D[:, :, :n] @ legs.f_begin[0]
         if self.start is not None:  # transitions that are taken at once, whenever the run begins
             self.of_time += self.D[:, :, :n] @ self.start.R_t
@@ -113,6 +112,11 @@ class Variation:
         return at_start + sum(-np.inf if jump is None else jump.log_determinant for jump in self.jumps)
 
 
+def held(u: FloatArray) -> FloatArray:
+    """States with zeros for those that a mode lacks."""
+    return np.where(np.isnan(u), 0.0, u)
+
+
 def apart(
     flow: VariationalFlow,
     log: TrajectoryLog,
@@ -131,7 +135,7 @@ def apart(
     before: list[FloatArray] = []
     memory = first[1][n_u:]
     instants, places = changes
-    u_before, u_after = np.nan_to_num(log.u_before), np.nan_to_num(log.u_after)
+    u_before, u_after = held(log.u_before), held(log.u_after)
     taken, crossings = 0, len(log.crossing_time)
 
     def change(upto: float, crossing: int) -> None:
@@ -142,7 +146,7 @@ def apart(
         count = here.stop - here.start
         if count == 0:
             return
-        u = np.nan_to_num(log.sample_u[places[here]])
+        u = held(log.sample_u[places[here]])
         if crossing < crossings and log.crossing_time[crossing] == instants[taken - 1]:
             u[-1] = u_before[crossing]
         states = [*np.hstack([u, np.tile(memory, (count, 1))])]

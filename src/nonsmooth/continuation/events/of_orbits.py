@@ -67,7 +67,7 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
-NEARER = 20  # steps back to a boundary from the first orbit behind it, at most
+NEARER = 60  # steps back to a boundary from the first orbit behind it, at most
 REACH = 60.0  # times the first of them: as far in all
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.

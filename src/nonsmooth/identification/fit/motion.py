@@ -13,7 +13,7 @@ from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.inputs import DelayedInputs, Driven
-from nonsmooth.flow.sensitivity import Variation
+from nonsmooth.flow.sensitivity import Variation, held
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.system import System
@@ -117,7 +117,7 @@ class Marcher:
         log = self.engine.record(self._tables[1], state, times[-1], samples, changes=changes, most=most)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             return None
-        u = np.hstack([np.nan_to_num(log.sample_u), log.sample_memory])
+        u = np.hstack([held(log.sample_u), log.sample_memory])
         if not np.isfinite(u).all():
             return None
         at = slice(1, None) if changes is None else 1 + np.searchsorted(instants, times)

@@ -131,23 +131,36 @@ class Observable:
             return z[:, self.state]
         return self._evaluate(t, z, mode, p)[:, 0]
 
-    def slopes(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray) -> FloatArray:
-        """Derivatives (N, n + n_active + 1) in z = (u, memory), the active parameters and the time."""
+    def slopes(
+        self,
+        t: FloatArray,
+        z: FloatArray,
+        mode: Any,
+        p: FloatArray,
+        D: FloatArray,
+        rate: FloatArray,
+        of_time: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives of the values in the start and the active parameters (N, n + n_active), along the motion, and in
+        the time of the whole run (N,): by those of the motion."""
         if self.state >= 0:
-            out = np.zeros((len(t), z.shape[1] + len(self.places) + 1))
-            out[:, self.state] = 1.0
-            return out
-        traced = self.system.traced
+            return D[:, self.state], rate[:, self.state], of_time[:, self.state]
+        traced, n = self.system.traced, z.shape[1]
         symbols = (*traced.u, *traced.m, *(traced.p[i] for i in self.places), traced.t)
-        return self._evaluate(t, z, mode, p, symbols)[:, 1:]
+        own = self._evaluate(t, z, mode, p, symbols)[:, 1:]
+        in_z, in_t = own[:, :n], own[:, -1]
+        of_all = np.einsum("ri,rij->rj", in_z, D)
+        of_all[:, n:] += own[:, n:-1]
+        return of_all, (in_z * rate).sum(axis=1) + in_t, (in_z * of_time).sum(axis=1) + in_t
 
     def _evaluate(
         self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray, symbols: tuple[Any, ...] | None = None
     ) -> FloatArray:
         """The output (N, 1), and its derivatives in some symbols behind it."""
-        traced, out = self.system.traced, np.zeros((len(t), 1 + len(symbols or ())))
-        for m in np.unique(mode):
-            here = np.flatnonzero(mode == m)
-            own = numeric(traced, (traced.outputs[self.output][int(m)],), symbols)
-            out[here] = own(p, t[here], *np.split(z[here], [len(traced.u)], axis=1)).reshape(len(here), -1)
+        traced, out = self.system.traced, np.empty((len(t), 1 + len(symbols or ())))
+        for m in dict.fromkeys(mode.tolist()):
+            here = mode == m
+            own = numeric(traced, (traced.outputs[self.output][m],), symbols)
+            n_u, states = len(traced.u), z[here]
+            out[here] = own(p, t[here], states[:, :n_u], states[:, n_u:]).reshape(len(states), -1)
         return out

@@ -222,8 +222,8 @@ class Windows:
     def instants(self, theta: FloatArray, window: Window) -> FloatArray:
         """Times on the record's corrected clock at which the motion is needed."""
         there = self.at(theta, window.record)
-        delays, time = np.unique(there.delays), there.clock * window.time
-        return time - delays[0] if len(delays) == 1 else np.unique(time[:, None] - delays)
+        delays, time = there.delays, there.clock * window.time
+        return time - delays[0] if (delays == delays[0]).all() else np.unique(time[:, None] - np.unique(delays))
 
     def readings(
         self, theta: FloatArray, window: Window, motion: SampledMotion, slopes: bool
@@ -237,7 +237,7 @@ class Windows:
         predicted, table = np.empty(len(k)), np.zeros((len(k) if slopes else 0, p + n))
         offset = 0.0 if not np.isfinite(period) else phase * period
         for j, (name, sensor) in enumerate(sensors.items()):
-            rows = np.flatnonzero(c == j)
+            rows = np.flatnonzero(c == j) if len(sensors) > 1 else slice(None)
             taken = clock * window.time[k[rows]] - sensor.delay + offset
             at = np.searchsorted(motion.time, taken - 1e-12 * abs(offset))
             at = np.minimum(at, len(motion.time) - 1)
@@ -248,13 +248,9 @@ class Windows:
             if not slopes:
                 continue
             assert motion.D is not None and motion.rate is not None and motion.of_time is not None
-            slope = readout.slopes(t, z, mode, values)
-            in_z, in_p, in_t = slope[:, :n], slope[:, n : n + a], slope[:, -1]
-            of_all = np.einsum("ri,rij->rj", in_z, motion.D[at])
-            of_shift = np.einsum("ri,ri->r", in_z, motion.of_time[at]) + in_t
-            table[rows, p:] = sensor.gain * of_all[:, :n]
-            table[rows, :a] = sensor.gain * (of_all[:, n:] + in_p)
-            now = np.einsum("ri,ri->r", in_z, motion.rate[at]) + in_t
+            along = motion.D[at], motion.rate[at], motion.of_time[at]
+            of_all, now, of_shift = readout.slopes(t, z, mode, values, *along)
+            table[rows, p:], table[rows, :a] = sensor.gain * of_all[:, :n], sensor.gain * of_all[:, n:]
             for i, (quantity, what) in enumerate(u.sensors, start=a):
                 if quantity == name and what == "delay":
                     table[rows, i] = -sensor.gain * now
@@ -272,6 +268,8 @@ class Windows:
     def limits(self, window: Window) -> FloatArray:
         """1 for each reading at the upper limit of its sensor, -1 at the lower one, else 0."""
         k, c = window.readings
+        if all(sensor.range is None for sensor in self.sensors.values()):
+            return np.zeros(len(k))
         at = np.stack([sensor.limit(window.values[:, j]) for j, sensor in enumerate(self.sensors.values())], axis=1)
         return at[k, c]
 
