@@ -143,3 +143,43 @@ def test_systems_that_were_defined_alike_have_their_own_answers() -> None:
             value, h = system.values[name], 1e-5
             one, other = (end(system, start, length, **{name: value + sign * h}) for sign in (1, -1))
             np.testing.assert_allclose(column, (one - other) / (2 * h), rtol=1e-5, atol=1e-5)
+
+
+def test_many_masses_do_the_same_at_one_instant() -> None:
+    """Twelve that are struck, and turned by their friction, together: "ever shorter times", as if they bounced."""
+
+    def last(count: int) -> np.ndarray:
+        names = [f"q{i}" for i in range(count)]
+        system = ns.mechanical(
+            np.eye(count),
+            0.1 * np.eye(count),
+            np.eye(count),
+            parameters={},
+            coordinates=names,
+            forcing={name: (lambda t, p: np.cos(1.7 * t)) for name in names},
+            elements={f"s{name}": ns.elements.Stop(at=name, position=0.15, restitution=0.4) for name in names}
+            | {f"f{name}": ns.elements.Coulomb(at=name, friction=0.1) for name in names},
+        )
+        run = ns.simulate(system, periods=4, start=dict.fromkeys(names, 0.05), samples=2)
+        assert run.sizes["crossing"] >= 8 * count
+        return np.asarray(run.u.values[-1]).reshape(2, count)
+
+    np.testing.assert_allclose(last(12), np.repeat(last(1), 12, axis=1), atol=1e-10)
+
+
+def test_a_chain_at_one_instant_may_come_by_a_mode_again() -> None:
+    """A reset is drawn on through four levels of one surface, each by a step of its own: as a staircase has steps."""
+    system = ns.System(
+        states=["x", "step"],
+        parameters={},
+        modes={"fall": lambda t, u, p: (-1.0, 0.0), "stand": lambda t, u, p: (-1.0, 0.0)},
+        indicators={"floor": lambda t, u, p: u.x, "low": lambda t, u, p: u.step - 8.5},
+        transitions=[
+            ns.Transition("fall", "stand", when="floor < 0", reset=lambda t, u, p: (0.0, u.step + 1.0)),
+            ns.Transition("stand", "fall", when="floor < 0 and low < 0", reset=lambda t, u, p: (0.0, u.step + 1.0)),
+            ns.Transition("stand", "stand", when="floor < 0 and low > 0", reset=lambda t, u, p: (1.0, 0.0)),
+        ],
+    )
+    run = ns.simulate(system, duration=2.5, start=[1.0, 0.0], samples=2)
+    assert run.crossing_time.values == pytest.approx([1.0] * 10 + [2.0] * 11)
+    assert run.u.values[-1] == pytest.approx([0.5, 0.0], abs=1e-12)

@@ -53,7 +53,7 @@ from nonsmooth.continuation.march.event import (
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.equilibrium import Equilibria
-from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
+from nonsmooth.continuation.problems.multipliers import distinct, product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.primitive import is_doubled
 from nonsmooth.continuation.problems.shooting import Shooting, in_a_family
@@ -138,10 +138,12 @@ class Flip(Event):
     name = "flip"
 
     def number(self, point: Any) -> float:
-        """det(M + I)."""
+        """det(M + I); of multipliers that stand more than once each counts once."""
         M = point.M
         if M.shape == (2, 2):
             return float(1.0 + M[0, 0] + M[1, 1] + (M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]))
+        if len(mu := distinct(point.multipliers)) < len(M):
+            return float(np.prod(np.array(mu) + 1.0).real)
         return float(np.linalg.det(M + np.eye(len(M))))
 
     def named(self, step: Step, point: Any) -> Name:
@@ -155,8 +157,11 @@ class NeimarkSacker(Event):
     name = "neimark_sacker"
 
     def number(self, point: Any) -> float:
-        """The product of (mu_i mu_j - 1) over all pairs."""
-        return product_of_pairs(without_own(point.multipliers, point.shooting.forced))
+        """The product of (mu_i mu_j - 1) over all pairs; of a multiplier that stands more than once the others count as
+        zeros."""
+        mu = without_own(point.multipliers, point.shooting.forced)
+        once = distinct(mu) if len(mu) > 2 else mu.tolist()
+        return product_of_pairs(np.array([*once, *[0j] * (len(mu) - len(once))]))
 
     def named(self, step: Step, point: Any) -> Name:
         """None where two real multipliers have the product 1."""

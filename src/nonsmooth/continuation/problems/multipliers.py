@@ -14,6 +14,7 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 
 EDGE = 1e-9  # a modulus within this of 1 counts as neither
+SAME = 1e-6  # of their sizes: multipliers as near as this are one
 NEUTRAL = 1e-6  # an unstable multiplier nearer to the unit circle than this is called neutral: no damping, a family
 
 
@@ -61,6 +62,16 @@ def nearest_to_one(mu: ComplexArray, forced: bool) -> complex:
     """The multiplier (but the orbit's own 1) that lies nearest to 1; NaN where there is none."""
     others = without_own(mu, forced)
     return complex(others[np.abs(others - 1.0).argmin()]) if len(others) else complex(np.nan)
+
+
+def distinct(mu: ComplexArray) -> list[complex]:
+    """The multipliers, once each: of copies side by side every one has the same, and of an even number of them that
+    pass a value together no product would change its sign."""
+    found: list[complex] = []
+    for one in mu.tolist():
+        if all(abs(one - other) > SAME * max(1.0, abs(one)) for other in found):
+            found.append(one)
+    return found
 
 
 def product_of_pairs(mu: ComplexArray) -> float:

@@ -105,6 +105,12 @@ class Walk:
         fires = np.array([jump.fires for jump in jumps], dtype=bool) & (self.net.at < 0)
         self.armed = (sources == self.modes[:, None]) & fires
         surface, conditions = _surfaces(traced)
+        self.conditions = conditions
+        #: The condition by which each visit ends; None where it is none, or holds at once.
+        self.fires_by = [
+            conditions[k][r - self.net.row_start[k]] if r >= 0 else None
+            for k, r in zip(self.fired, self.fired_row, strict=True)
+        ]
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
         for i, (k, r) in enumerate(zip(self.fired, self.fired_row, strict=True)):
             if k >= 0:  # of those behind it none is taken that holds wherever it does, or by the condition that fires
@@ -188,7 +194,8 @@ class Walk:
         if status:
             return None
         # Beside a boundary that has just been crossed only what is solved for tells which side is meant.
-        crossed = self.crossed[self.every[:, None], self.net.rows[begin_row, 0]] if self.crossed.size else False
+        together, zeros = self._of_one_instant(tau, float(solved.times[-1]))
+        crossed = zeros[self.every[:, None], self.net.rows[begin_row, 0]] if zeros.size else False
         zero = np.abs(begin) <= np.where(crossed, SOLVED, ROUNDING) * size
         # Where several rows vanish as a visit begins, a lift-off, rounding of one is no maximum of another.
         begun = place - solved.times[:-1, None] <= BEGUN * float(solved.times[-1])
@@ -214,13 +221,13 @@ class Walk:
             own[np.searchsorted(self.conditional, i)] = taken
         own[self.alone] = np.inf
         if n_t and m > 1:
-            rest = np.where(self.elsewhere[:-1], end[:-1], -np.inf)
+            rest = np.where(self.elsewhere[:-1] & ~together[:-1], end[:-1], -np.inf)
             other = rest.argmax(axis=1)
             others = rest[self.every[:-1], other]
         else:
             other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
         watched = m > 1 and len(self.net.rows) > 2  # the section is passed, nothing has led there
-        held = self._held(begin, zero) if watched else np.full((m, 1), -np.inf)
+        held = self._held(begin, zero | (together & (tau == 0.0)[:, None])) if watched else np.full((m, 1), -np.inf)
         landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
@@ -240,6 +247,25 @@ class Walk:
             landing,
             begin[0],
         )
+
+    def _of_one_instant(self, tau: FloatArray, period: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Transitions (m, n_t) that fire at the instant at which a visit ends, each by itself, since visits behind or
+        before have no length: two masses side by side are struck. And the indicators (m, n_indicators) that are zero
+        where visits begin."""
+        together, zeros = np.zeros_like(self.armed), self.crossed
+        still = (np.abs(tau) <= self.nothing * period) & (self.fired_row >= 0)
+        still[0] = False
+        if not still.any():
+            return together, zeros
+        zeros, first = zeros.copy(), 0
+        for i in range(1, len(still)):
+            if still[i]:
+                zeros[i + 1] |= zeros[i]
+                fired = set(self.fires_by[first : i + 1])
+                together[first : i + 1] = [not fired.isdisjoint(rows) for rows in self.conditions]
+            else:
+                first = i
+        return together, zeros
 
     def _held(self, begin: FloatArray, zero: NDArray[np.bool_]) -> FloatArray:
         """Margins where the visits begin; -inf for those that are ``zero`` there."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 RTOL = 1e-13  # where the flow is not exact
 ROUNDING = 1e-14  # of the period
+INSTANT = 1e-12  # of the period: transitions as near as this happen at one instant
 SHORT = 1e-6  # of the period: as soon after an impact follows the next one shortly before rest
 INTO = 0.38  # of the visit in which a round begins: half way, symmetric motion may touch something
 LATE = 0.25  # of the period: the largest change of the period of a neighbour
@@ -67,15 +68,17 @@ class Rounds:
                 return True
         return False
 
-    def _told(self, transitions: list[int], times: FloatArray, period: float) -> list[int]:
-        """The transitions but for impacts that another one follows at once: how many come before rest is rounding."""
-        jumps = self.system.traced.transitions
-        follows = np.diff(times, append=np.inf) < SHORT * period
-        return [
-            k
-            for k, at_once in zip(transitions, follows, strict=True)
-            if not (at_once and jumps[k].source == jumps[k].target)
-        ]
+    def _told(self, transitions: list[int], times: FloatArray, period: float) -> list[Any]:
+        """The transitions but for impacts that another one follows at once: how many come before rest is rounding. So
+        is the order of those that happen at one instant, each by itself: of them the conditions."""
+        jumps, told, among = self.system.traced.transitions, list[Any](), list[int]()
+        for k, until in zip(transitions, np.diff(times, append=np.inf), strict=True):
+            if not (INSTANT * period < until < SHORT * period and jumps[k].source == jumps[k].target):
+                among.append(k)
+            if until > INSTANT * period:
+                told += among if len(among) < 2 else sorted(repr(jumps[one].rows) for one in among)
+                among = []
+        return told
 
     @cached_property
     def second(self) -> Engine:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.signature import Round, Signature, Visit
+from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
 from nonsmooth.continuation.problems.visits import anchored, round_of
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import IntArray, State, TrajectoryLog
@@ -37,7 +37,7 @@ SAMPLES = 4001
 FEW, MANY = 8, 200  # rounds in an interval of motion that is long, and short, enough to look at
 LONGEST = 1e6
 REST = 1e-7  # of its scale: a motion smaller than this has come to rest
-AT_ONCE = 1e-12  # of a unit of time: what happens within it happens at the start
+INSTANT = 1e-12  # of a unit of time: what happens within it happens at the start
 TENDS = "the motion tends to an equilibrium:"
 ELSEWHERE = (
     "Give start=, a state away from it, or follow the equilibrium with continue_equilibrium to where a cycle emanates"
@@ -142,7 +142,9 @@ def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[
             count = 1
         elif i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period:
             count = 2 if visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0 else 0
-        if count:
+        while count and visits[i + count].row == AT_ONCE:
+            count += 1
+        if count and visits[i + count].mode == visits[i].mode:
             found, kicks = found.without(i, count), np.delete(kicks, np.arange(i, i + count))
         else:
             i += 1
@@ -177,7 +179,7 @@ def autonomous_guesses(
         return _seen(log, instants, system)
 
     first = state.copy()  # in the mode to which transitions that already hold lead
-    engine.record(tables, first, float(first.clock[0]) + AT_ONCE, np.empty(0))
+    engine.record(tables, first, float(first.clock[0]) + INSTANT, np.empty(0))
     _refuse_equilibrium(system, first, "the start", ROUNDING)
     duration = 64.0
     while True:

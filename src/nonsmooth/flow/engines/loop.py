@@ -18,7 +18,18 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, KernelMarch, State, TrajectoryLog, end_if_not_wanted
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.codes import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
+from nonsmooth.kernels.hybrid.codes import (
+    BEGUN,
+    CONCERNS,
+    CROSSINGS,
+    DEAD_END,
+    MODE,
+    RESET,
+    STARTS,
+    TIME,
+    TOUCHES,
+    WAITS,
+)
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
@@ -35,7 +46,6 @@ DIVERGENCE = 1e9  # in units of a state's scale
 KINDS = {ALONE: codes.ALONE, OWN: codes.OWN, ASKS_BEHIND: codes.ASKS_BEHIND}
 #: Called by the thread of a run whenever it pauses.
 at_pause: list[Callable[[], None]] = []
-SPARE = 64  # crossings that one leg may add to a log
 
 
 class Engine(ABC):
@@ -124,7 +134,7 @@ class Engine(ABC):
         base, pattern = decider.modes[mode]
         memory, step = self.memory_in(work), 0.0 if starts else self.step_in(mode, system)
         numbers = local.point(mode, float(work.memo[TIME]), work.w[:n], memory, step)
-        fired = int(work.tally[FIRED])
+        fired = int(work.tally[CONCERNS])
         met = [] if fired < 0 else decider.met(self.traced.indicator_names[fired], self.traced.indicators[fired])
         found = begun(numbers, pattern) if starts else decide(numbers, pattern, met)
         there, taken = decider.number(base, found.pattern), -1

@@ -11,7 +11,7 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, Points, State
 from nonsmooth.flow.engines.linear import table_bytes
-from nonsmooth.kernels.hybrid.codes import DEAD_END, FIRED, MODE, RESET, STARTS, TIME, WAITS
+from nonsmooth.kernels.hybrid.codes import CONCERNS, DEAD_END, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.codegen.linear import apart, put_together
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
@@ -107,7 +107,7 @@ class PatternTables:
                 self.work.tally[STARTS] = -1 - ENDS.index(found.ends)
         else:
             numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]), pattern)
-            fired = int(tally[FIRED])
+            fired = int(tally[CONCERNS])
             found = decide(numbers, pattern, self._met(here, fired), self._concerned(lead, fired))
             taken = self._answer(waits, found)
         if taken < 0 or not found.struck:

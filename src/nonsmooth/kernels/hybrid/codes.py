@@ -32,7 +32,8 @@ CHANGES = 18  # of inputs, so far
 # one more than the returns, where a run was last compared with the place noted, and where that was noted (0: none); its
 # mode, and the transitions and contacts in the kept window by then
 LOOKED, NOTED_AT, NOTED_MODE, NOTED_CROSSINGS, NOTED_CONTACTS = 19, 20, 21, 22, 23
-N_TALLY = 24
+CONCERNS = 24  # the condition by which what is asked was met, or -1: it may not be the first one of its instant
+N_TALLY = 25
 
 # and in ``work.memo``: times
 TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start
@@ -42,7 +43,7 @@ N_MEMO = 7
 
 MOST_CROSSINGS = 50_000  # within one return, period or unit of time: with e = 0.999 a mass rests after some 16 000
 REPEATS_WITHIN = 16  # returns from a place noted to the last one that is compared with it
-MOST_AT_ONCE = 60  # at one instant: a log has room for 64 more when a step begins
+MOST_AT_ONCE = 500  # transitions at one instant: a log has room for so many when a step begins
 MOST_STEPS = 2_000_000  # on the way to the next return
 BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter
 SHORT = 1e-11

@@ -23,6 +23,7 @@ from nonsmooth.kernels.hybrid.codes import (
     CHATTER,
     CLOSED,
     CLOSELY,
+    CONCERNS,
     DEAD_END,
     DIVERGED,
     DONE,
@@ -181,17 +182,19 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     tally = work.tally
     mode, code, fired = tally[MODE], OK, tally[FIRED]
     jumps = tally[TAKEN] if MAY_WAIT != 0 else 0
+    concerns = fired
     if jumps == 0:
         if MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and meets_another(mode, fired, fired, net, tables, work):
             t = net.together[mode]
         tally[SOURCE], tally[FIRST] = mode, t
         approach(mode, fired, goal, seen, tables, work)
     while t >= 0:
-        if jumps > min(net.mode_start.shape[0] + 1, MOST_AT_ONCE):  # as many as modes, and three
+        if jumps == MOST_AT_ONCE:
             code = CHATTER
             break
         if MAY_WAIT != 0 and net.transitions[t, 0] < 0:
             tally[WAITS], tally[TAKEN], tally[CLOSELY] = t + 1, jumps, 1 if short else 0
+            tally[CONCERNS] = concerns
             return PAUSED, 0
         mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
         cross(i, t, jumps, mode, form, net, section, goal, seen, tables, work)
@@ -202,14 +205,16 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             break
         alone = MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and net.transitions[t, 1] == RESET
         asks = MAY_WAIT != 0 and net.transitions[t, 4] == ASKS_BEHIND
-        t = next_holding(mode, tables, net, work)
+        struck = net.rows[net.row_start[t], 0] if alone else -1
+        t, concerns = next_holding(mode, tables, net, work), fired
         if MAY_WAIT != 0 and t >= 0 and net.transitions[t, 4] == ALONE and net.together[mode] >= 0:
-            if meets_another(mode, fired, net.rows[net.row_start[t], 0], net, tables, work):
+            concerns = net.rows[net.row_start[t], 0]
+            if meets_another(mode, fired, concerns, net, tables, work):
                 t = net.together[mode]
         if asks and (t < 0 or net.transitions[t, 4] < OWN):
-            t = net.together[mode]
+            t, concerns = net.together[mode], fired
         if alone and meets_another(mode, fired, fired, net, tables, work):  # an impact has ended other rates too
-            t = net.together[mode]
+            t, concerns = net.together[mode], struck
     tally[TAKEN] = 0
     depart(jumps, goal, seen, work)
     tally[JUMPS] += jumps

@@ -8,6 +8,7 @@ from nonsmooth.kernels.hybrid.codes import (
     JUMPS,
     LOG_FULL,
     MODE,
+    MOST_AT_ONCE,
     NO_END,
     OK,
     PERIODS,
@@ -17,8 +18,6 @@ from nonsmooth.kernels.hybrid.codes import (
 )
 from nonsmooth.kernels.linear.stepper import memory_at, state_at
 from nonsmooth.kernels.linear.touches import log_touches
-
-SPARE = 64  # crossings that one leg may add to the log
 
 
 @once
@@ -31,7 +30,7 @@ def base_of(i, form, work):
 @once
 def room_in_log(seen, work):
     """LOG_FULL asks for larger logs."""
-    crossings = work.tally[CROSSINGS] + SPARE > seen.crossing_time.shape[0]
+    crossings = work.tally[CROSSINGS] + MOST_AT_ONCE > seen.crossing_time.shape[0]
     return LOG_FULL if crossings or work.tally[TOUCHES] + seen.spare > seen.touch_time.shape[0] else OK
 
 

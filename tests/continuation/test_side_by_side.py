@@ -1,0 +1,63 @@
+"""Branches of copies that do not feel each other: those of one, with every multiplier once for each copy."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.continuation.events.of_orbits import NeimarkSacker
+
+E = ns.elements
+
+
+def copies(count: int, **elements: ns.elements.Element) -> ns.System:
+    """Forced masses, each before elements of its own."""
+    names = [f"q{i}" for i in range(count)]
+    return ns.mechanical(
+        np.eye(count),
+        0.16 * np.eye(count),
+        0.81 * np.eye(count),
+        parameters={"w": 1.47, "d": 0.2},
+        coordinates=names,
+        forcing={name: (lambda t, p: 1.45 * np.cos(p.w * t)) for name in names},
+        elements={f"{key}{name}": make(name) for name in names for key, make in elements.items()},
+    )
+
+
+def followed(system: ns.System, count: int) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Kinds and places of special points of the branch from end to end, and multipliers of its last point."""
+    orbit = ns.find_orbit(system, start={f"q{i}": 0.05 for i in range(count)})
+    branch = ns.continue_orbit(orbit, "w", (1.2, 2.25), points=200)
+    assert branch["w"].values[[0, -1]] == pytest.approx([1.2, 2.25], abs=1e-12)
+    special = ns.special_points(branch)
+    order = np.argsort(special["w"].values)
+    return list(special["kind"].values[order]), special["w"].values[order], branch["floquet_multipliers"].values[-1]
+
+
+@pytest.mark.physics
+def test_copies_that_are_struck_at_one_instant_have_the_branch_of_one() -> None:
+    """It ended at a corner that rounding made, or passed the flip, where two multipliers pass -1 together."""
+
+    def stop(name: str) -> ns.elements.Stop:
+        return E.Stop(at=name, position="d", restitution=0.87, rest=False)
+
+    kinds, places, multipliers = followed(copies(1, s=stop), 1)
+    assert kinds == ["flip"]
+    twice = followed(copies(2, s=stop), 2)
+    assert twice[0] == kinds
+    assert twice[1] == pytest.approx(places, abs=1e-8)
+    assert np.sort_complex(twice[2]) == pytest.approx(np.sort_complex(np.repeat(multipliers, 2)), abs=1e-6)
+
+
+def test_pairs_that_leave_the_unit_circle_together_change_the_sign() -> None:
+    pair = np.exp(np.array([1j, -1j]))
+    for count in (1, 2, 3):
+        points = [
+            SimpleNamespace(multipliers=np.tile(radius * pair, count), shooting=SimpleNamespace(forced=True))
+            for radius in (0.99, 1.01)
+        ]
+        inside, outside = map(NeimarkSacker().number, points)
+        assert inside * outside < 0.0
