@@ -52,6 +52,22 @@ def test_copies_that_are_struck_at_one_instant_have_the_branch_of_one() -> None:
     assert np.sort_complex(twice[2]) == pytest.approx(np.sort_complex(np.repeat(multipliers, 2)), abs=1e-6)
 
 
+@pytest.mark.physics
+def test_copies_that_change_their_modes_at_one_instant_have_no_corners() -> None:
+    """A support that is left as its force ends: its gap is beyond its surface then, and the force just on it."""
+
+    def support(name: str) -> ns.elements.ElasticStop:
+        return E.ElasticStop(at=name, position=0.4, stiffness=20.0, damping=0.2)
+
+    one, two = (ns.find_orbit(copies(n, s=support), start={f"q{i}": 0.05 for i in range(n)}) for n in (1, 2))
+    branches = [ns.continue_orbit(orbit, "w", (1.4, 1.54)) for orbit in (one, two)]
+    for branch in branches:
+        assert branch["w"].values[[0, -1]] == pytest.approx([1.4, 1.54], abs=1e-12)
+        assert ns.special_points(branch).sizes["special"] == 0
+    first, second = (branch["section"].values[-1] for branch in branches)
+    assert second == pytest.approx(np.repeat(first, 2), abs=1e-9)
+
+
 def test_pairs_that_leave_the_unit_circle_together_change_the_sign() -> None:
     pair = np.exp(np.array([1j, -1j]))
     for count in (1, 2, 3):

@@ -105,10 +105,10 @@ class Walk:
         fires = np.array([jump.fires for jump in jumps], dtype=bool) & (self.net.at < 0)
         self.armed = (sources == self.modes[:, None]) & fires
         surface, conditions = _surfaces(traced)
-        self.conditions = conditions
-        #: The condition by which each visit ends; None where it is none, or holds at once.
+        self.surfaces = [{one[0] for one in rows} for rows in conditions]
+        #: The surface by which each visit ends; None where it is none, or holds at once.
         self.fires_by = [
-            conditions[k][r - self.net.row_start[k]] if r >= 0 else None
+            conditions[k][r - self.net.row_start[k]][0] if r >= 0 else None
             for k, r in zip(self.fired, self.fired_row, strict=True)
         ]
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
@@ -262,7 +262,7 @@ class Walk:
             if still[i]:
                 zeros[i + 1] |= zeros[i]
                 fired = set(self.fires_by[first : i + 1])
-                together[first : i + 1] = [not fired.isdisjoint(rows) for rows in self.conditions]
+                together[first : i + 1] = [not fired.isdisjoint(one) for one in self.surfaces]
             else:
                 first = i
         return together, zeros
