@@ -209,3 +209,24 @@ def test_masses_of_a_chain_are_positive_definite_up_to_the_known_coupling() -> N
         assert system.with_parameters(d=sign * 0.9999 * edge)
         with pytest.raises(ValueError, match="the mass matrix must be positive definite"):
             system.with_parameters(d=sign * 1.0001 * edge)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+@pytest.mark.parametrize("speed", [0.0, 1e-15, -1e-15, 1e-12, -1e-12, -1e-9, -1e-6, -9e-5, -1e-3, 1e-6])
+def test_a_slip_however_small_turns_round_under_a_load_beyond_friction(speed: float, method: str) -> None:
+    """A block at this speed, under a load of 1 and friction of 0.3, is at v0 + 0.7 t, or turns after -v0 / 1.3."""
+    friction = ns.elements.Coulomb(at="q", friction=0.3)
+    block = ns.mechanical(1.0, 0.0, 0.0, forcing={"q": lambda t, p: 1.0}, elements={"f": friction}, coordinates="q")
+    run = ns.simulate(block, duration=2.0, start={"v_q": speed}, method=method)
+    end = speed + 0.7 * 2.0 if speed >= 0 else 0.7 * (2.0 + speed / 1.3)
+    assert float(run["u"].sel(state="v_q")[-1]) == pytest.approx(end, abs=1e-14)
+
+
+@pytest.mark.parametrize("load", [0.3, -0.3, 0.2999999])
+def test_a_load_as_large_as_the_friction_holds(load: float) -> None:
+    friction = ns.elements.Coulomb(at="q", friction=0.3)
+    block = ns.mechanical(1.0, 0.0, 0.0, forcing={"q": lambda t, p: load}, elements={"f": friction}, coordinates="q")
+    start = {"v_q": -0.6 * np.sign(load)}  # its deceleration is the load and the friction: 0.6
+    run = ns.simulate(block, duration=3.0, start=start)
+    assert run["mode"].values[-1] == list(block.modes).index("f_stick")
+    assert float(run["u"].sel(state="q")[-1]) == pytest.approx(-np.sign(load) * 0.18 / (abs(load) + 0.3), abs=1e-12)

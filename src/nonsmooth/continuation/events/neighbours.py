@@ -170,7 +170,7 @@ def _came_by(point: OrbitPoint, found: OrbitPoint, passed: Sequence[OrbitPoint])
     cycle, seen = found.signature.cycle, found.curve.seen(found)
     for a, b in pairwise(passed):
         if a.curve is b.curve and a.signature.cycle == cycle:
-            x = passing(seen, a.curve.seen(a), b.curve.seen(b))
+            x = passing(seen, a.curve.seen(a), b.curve.seen(b), -BACK)  # where the part begins too
             own = None if x is None else a.curve.at_parameter(a.Y + x * (b.Y - a.Y), found.value)
             if own is not None and _is_same(point, own, found):
                 return True

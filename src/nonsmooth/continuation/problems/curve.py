@@ -322,11 +322,13 @@ class Curve(ABC, Generic[P]):
         return point if float(point.tangent @ a.tangent) > 0.0 else point.turned()
 
 
-def passing(Y: FloatArray, a: FloatArray, b: FloatArray) -> float | None:
-    """The part of the step from a to b after which it goes through Y, as nearly as a chord follows a curve, or None."""
+def passing(Y: FloatArray, a: FloatArray, b: FloatArray, least: float = 1e-9) -> float | None:
+    """The part of the step from a to b after which it goes through Y, as nearly as a chord follows a curve, or None.
+
+    It is more than ``least``: a itself does not count, unless that is negative."""
     step = b - a
     x = float(step @ (Y - a)) / max(float(step @ step), 1e-300)
-    return x if 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max()) else None
+    return x if least < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max()) else None
 
 
 def tangents(curve: Curve[Any], Y: FloatArray) -> FloatArray | None:

@@ -129,8 +129,7 @@ class Coulomb(Friction):
 
     def leaving(self, here: Place) -> list[Leaving]:
         v, hold, most = here.where, here.put("stick").holding(), self.most(here)
-        over, under = hold - most, hold + most
-        torn_back, torn_forward = Condition(over, 1, "over"), Condition(under, -1, "under")
+        torn_back, torn_forward = Condition(hold - most, 1, "over"), Condition(hold + most, -1, "under")
         if here.phase == "stick":
             off = SMALL * here.size(v)
             begins = (
@@ -142,21 +141,13 @@ class Coulomb(Friction):
                 else []
             )
             return [*begins, Leaving("back", [torn_back]), Leaving("forward", [torn_forward])]
-        other, sign, torn = ("back", -1, torn_back) if here.side > 0 else ("forward", 1, torn_forward)
+        other, sign = ("back", -1) if here.side > 0 else ("forward", 1)
         stopped = Condition(v, sign, "speed")
         if here.vanishes(most):
             return [Leaving(other, [stopped])]  # an open contact, which bears no friction
-        within = [Condition(over, -1, "over"), Condition(under, 1, "under")]
-        still = here.struck(0)
-        tie = Leaving("stick", [stopped], still)  # a load as large as the friction, to all orders: it holds
-        if not here.is_turned():
-            return [Leaving("stick", [stopped, *within], still), Leaving(other, [stopped, torn]), tie]
-        # An impact or an input turns the speed round at once, and no finite force can stop it then.
-        off = -sign * CREEP * here.size(v)
-        slow, turned = (Condition(v + off, one * sign, f"turned_{here.phase}") for one in (-1, 1))
-        return [
-            Leaving("stick", [stopped, slow, *within], still),
-            Leaving(other, [stopped, torn]),
-            Leaving(other, [turned]),
-            Leaving("stick", [stopped, slow], still),
-        ]
+        passes = [torn_back, torn_forward]
+        if here.is_turned():
+            # An impact or an input turns the speed round at once, and no finite force can stop it then.
+            passes.append(Condition(v - sign * CREEP * here.size(v), sign, f"turned_{here.phase}"))
+        # What does not pass is held: within the bounds, or by a load as large as the friction, to all orders.
+        return [*(Leaving(other, [stopped, one]) for one in passes), Leaving("stick", [stopped], here.struck(0))]
