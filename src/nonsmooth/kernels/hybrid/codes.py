@@ -44,6 +44,7 @@ N_MEMO = 7
 MOST_CROSSINGS = 50_000  # within one return, period or unit of time: with e = 0.999 a mass rests after some 16 000
 REPEATS_WITHIN = 16  # returns from a place noted to the last one that is compared with it
 MOST_AT_ONCE = 500  # transitions at one instant: a log has room for so many when a step begins
+MOST_ROUNDS = 5  # among them of the first: a reset that leaves the state on its way on, ever slower
 MOST_STEPS = 2_000_000  # on the way to the next return
 BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter
 SHORT = 1e-11

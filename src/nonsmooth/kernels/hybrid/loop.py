@@ -34,6 +34,7 @@ from nonsmooth.kernels.hybrid.codes import (
     MODE,
     MOST_AT_ONCE,
     MOST_CROSSINGS,
+    MOST_ROUNDS,
     NO_END,
     NOT_GUARANTEED,
     NOT_UNIQUE,
@@ -182,14 +183,14 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     tally = work.tally
     mode, code, fired = tally[MODE], OK, tally[FIRED]
     jumps = tally[TAKEN] if MAY_WAIT != 0 else 0
-    concerns = fired
+    concerns, rounds = fired, 0
     if jumps == 0:
         if MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and meets_another(mode, fired, fired, net, tables, work):
             t = net.together[mode]
         tally[SOURCE], tally[FIRST] = mode, t
         approach(mode, fired, goal, seen, tables, work)
     while t >= 0:
-        if jumps == MOST_AT_ONCE:
+        if jumps == MOST_AT_ONCE or rounds > MOST_ROUNDS:
             code = CHATTER
             break
         if MAY_WAIT != 0 and net.transitions[t, 0] < 0:
@@ -215,6 +216,8 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             t, concerns = net.together[mode], fired
         if alone and meets_another(mode, fired, fired, net, tables, work):  # an impact has ended other rates too
             t, concerns = net.together[mode], struck
+        if t == tally[FIRST] and net.transitions[t, 0] >= 0:
+            rounds += 1
     tally[TAKEN] = 0
     depart(jumps, goal, seen, work)
     tally[JUMPS] += jumps
