@@ -17,7 +17,7 @@ from nonsmooth.identification.fit.steady import is_steady, of_table
 from nonsmooth.identification.measured_units import compare_units_of_readings, units_of
 from nonsmooth.identification.options import Comparing
 from nonsmooth.results.labels import labelled, labels_of
-from nonsmooth.system.arguments import checked
+from nonsmooth.system.arguments import check_system, checked
 from nonsmooth.system.kinds import real_number
 from nonsmooth.system.system import System
 
@@ -140,6 +140,8 @@ def compare(
         options["draws"] = DRAWS if uncertain and hasattr(theory, "parameters") else 0
     if not 0 < options["level"] < 1:
         raise ValueError(f"level = {options['level']!r} must lie between 0 and 1, as 0.95")
+    if isinstance(theory, System):
+        check_system(theory, "compare")
     if not isinstance(measured, xr.Dataset) or channels is not None:
         if not isinstance(theory, System):
             raise TypeError(f"a recording is laid over a System, not over a result; of a measured motion: {FORMS}")
