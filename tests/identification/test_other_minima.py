@@ -39,7 +39,7 @@ def before_a_stop(seed: int) -> tuple[ns.System, dict[str, Any], dict[str, float
 
 @pytest.mark.parametrize("seed", [38, 54, 183])
 def test_a_near_fit_in_another_minimum_is_left(seed: int) -> None:
-    """From these guesses a fit of the whole record ends 5 to 8 standard uncertainties off, at a smooth minimum."""
+    """From these guesses a fit of the whole record ends 5 standard uncertainties off or more, at a smooth minimum."""
     system, recording, truth, guess = before_a_stop(seed)
     found = ns.fit(system.with_parameters(**guess), recording, list(truth), progress=False)
     assert not found.anomalies

@@ -36,7 +36,7 @@ KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's me
 CLOSE = 2e-12
 AT = 1e-4  # of the period: a maximum as near to a crossing may be that crossing
 ALIKE = 1e-9  # of a gradient: what two differ by
-AT_ONCE = 1e-10  # of the largest margin: a touch as near comes with the curve's own
+NIL = 1e-10  # of the largest margin: a touch as near as this is one
 
 
 class Touched(NamedTuple):
@@ -221,7 +221,7 @@ class Locus(Orbits):
             inner = path.inner.copy()
             inner[np.ix_(visits, conditions)] = -np.inf
             # Touches that come with it, half a period on where motion is symmetric, are as nil as its own.
-            inner[np.abs(inner) <= AT_ONCE * np.abs(inner).max(initial=0.0, where=np.isfinite(inner))] = -np.inf
+            inner[np.abs(inner) <= NIL * np.abs(inner).max(initial=0.0, where=np.isfinite(inner))] = -np.inf
             if turn is not None:  # reached as the visit ends, and as the next one begins
                 i, others, landed = visits[0], path.others.copy(), path.landed.copy()
                 inner[i + 1, conditions] = -np.inf

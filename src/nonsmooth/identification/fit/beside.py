@@ -28,17 +28,16 @@ _GAIN = 0.1  # of the sum of squares, in squares of the noise: less is the end o
 
 def looked_beside(grown: Grown, finished: Callable[[Stage], Grown]) -> Grown:
     """The best of the minima found from one to the next, with the unknowns in doubt; ``finished`` is a fit's end."""
-    for _ in range(_MOVES):
+    for left in range(_MOVES, -1, -1):
         found = _beside(grown)
-        better = _better(grown, found)
+        better = _better(grown, found) if left else None
         if better is None:
-            doubted = dict.fromkeys(i for rise, i, _ in found if rise < BETTER)
-            return replace(grown, doubted=tuple(doubted))
+            break
         try:
             grown = replace(finished(better), stuck=grown.stuck)
         except SolveError:
             break
-    return grown
+    return replace(grown, doubted=tuple(dict.fromkeys(i for rise, i, _ in found if rise < BETTER)))
 
 
 def _beside(grown: Grown) -> list[tuple[float, int, FloatArray]]:
