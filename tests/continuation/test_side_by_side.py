@@ -68,6 +68,30 @@ def test_copies_that_change_their_modes_at_one_instant_have_no_corners() -> None
     assert second == pytest.approx(np.repeat(first, 2), abs=1e-9)
 
 
+@pytest.mark.physics
+def test_copies_whose_impacts_turn_their_friction_have_the_multipliers_of_one() -> None:
+    """The impact of the second was one with the first: its multipliers were -0.41 and 0.19 for -0.05 +- 0.15 i."""
+
+    def found(count: int) -> ns.Orbit:
+        names = [f"q{i}" for i in range(count)]
+        unit = np.eye(count)
+        system = ns.mechanical(
+            unit,
+            0.28 * unit,
+            1.31 * unit,
+            parameters={"w": 1.66},
+            coordinates=names,
+            forcing={name: (lambda t, p: 0.77 * np.cos(p.w * t)) for name in names},
+            elements={f"f{name}": E.Coulomb(at=name, friction=0.14) for name in names}
+            | {f"s{name}": E.Stop(at=name, position=0.13, restitution=0.31) for name in names},
+        )
+        return ns.find_orbit(system, start=dict.fromkeys(names, 0.05))
+
+    one, two = found(1), found(2)
+    assert two.u == pytest.approx(np.repeat(one.u, 2), abs=1e-9)
+    assert two.monodromy_matrix == pytest.approx(np.kron(one.monodromy_matrix, np.eye(2)), abs=1e-8)
+
+
 def test_pairs_that_leave_the_unit_circle_together_change_the_sign() -> None:
     pair = np.exp(np.array([1j, -1j]))
     for count in (1, 2, 3):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,40 @@ def test_side_by_side_each_has_the_exponents_that_it_has_alone(
         monkeypatch.setattr("nonsmooth.system.derived.combinations.MOST", 1)
     alone = exponents(1, friction, method)
     assert exponents(2, friction, method) == pytest.approx(np.repeat(alone, 2), abs=1e-9)
+
+
+def struck_and_turned(count: int, hardening: float) -> ns.System:
+    """Masses on springs with a stop and dry friction each: an impact turns the friction of its own mass."""
+
+    def field(t: Any, u: Any, p: Any) -> list[Any]:
+        q, v = list(u)[:count], list(u)[count:]
+        return [*v, *(p.F * np.cos(1.7 * t) - 0.1 * w - x - hardening * x**3 for x, w in zip(q, v, strict=True))]
+
+    elements: dict[str, Any] = {}
+    for i in range(count):
+        elements[f"f{i}"] = ns.elements.Coulomb(
+            speed=lambda t, u, p, v=f"v{i}": getattr(u, v), on={f"v{i}": 1.0}, friction=0.1
+        )
+        elements[f"s{i}"] = ns.elements.Stop(
+            gap=lambda t, u, p, q=f"q{i}": 0.15 - getattr(u, q), on={f"v{i}": -1.0}, restitution=0.4
+        )
+    names = [f"{x}{i}" for x in "qv" for i in range(count)]
+    return ns.System(states=names, parameters={"F": 1.0}, modes={"all": field}, elements=elements)
+
+
+@pytest.mark.parametrize("hardening", [0.0, 0.3])
+def test_an_impact_turns_the_friction_of_its_own_mass_alone(hardening: float) -> None:
+    """Two such masses were asked as one, by the instant of the first: their derivatives and multipliers were mixed."""
+
+    def found(count: int) -> tuple[np.ndarray, np.ndarray]:
+        system = struck_and_turned(count, hardening)
+        given = ns.sensitivity(system, periods=2, start={f"q{i}": 0.05 for i in range(count)}, parameters=["F"])
+        return given["Phi"].values, given["P"].values
+
+    (alone, by_force), (both, by_both) = found(1), found(2)
+    assert np.abs(by_force).max() > 0.1
+    assert both == pytest.approx(np.kron(alone, np.eye(2)), abs=1e-9)
+    assert by_both == pytest.approx(np.repeat(by_force, 2, axis=0), abs=1e-9)
 
 
 @pytest.mark.parametrize("method", ["taylor", "rkf45"])

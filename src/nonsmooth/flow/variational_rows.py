@@ -352,7 +352,7 @@ class Packed:
     def _rubbed(self, rows: Rows, mode: int, change: Reset, w: FloatArray) -> FloatArray:
         """The map of an impact that rubs at an instant: its impulses are homogeneous functions of the rates."""
         numbers = RowNumbers(rows, self.patterns.mode, w.copy())
-        concerned = rows.with_group_of(max(change.elements[0], ~change.elements[0]))
+        concerned = rows.with_group_of(max(change.elements[0], ~change.elements[0]), self.patterns.mode)
         found = decide(numbers, self.patterns.visited[mode], change.elements, concerned).rubbed
         return rows.identity() if found is None else rows.rubbed(*found)
 

@@ -65,9 +65,9 @@ def inserted(point: OrbitPoint) -> list[Change]:
         return Change(point, free.with_inserted(place, new, t, after), free, place, len(new), indicator, True)
 
     found = []
-    for taken in _answers(traced, k):
-        jump, entry = traced.transitions[taken], flow.jump(values, taken, t, z, row)
-        first = Visit(jump.source, taken, row)
+    for taken, met in _answers(traced, k, row):
+        jump, entry = traced.transitions[taken], flow.jump(values, taken, t, z, met)
+        first = Visit(jump.source, taken, met)
         if jump.target == jump.source:
             found.append(change([first], [entry.z_after]))
             continue
@@ -82,15 +82,15 @@ def inserted(point: OrbitPoint) -> list[Change]:
     return found
 
 
-def _answers(traced: Traced, k: int) -> list[int]:
-    """A transition; where it is a question, those to which it has led so far."""
+def _answers(traced: Traced, k: int, row: int) -> list[tuple[int, int]]:
+    """A transition and its row that is met; where it is a question, those to which that has led so far."""
     jump = traced.transitions[k]
     if jump.kind != ASKED:
-        return [k]
+        return [(k, row)]
     return [
-        j
+        (j, other.rows.index(jump.rows[row]))
         for j, other in enumerate(traced.transitions)
-        if other.kind == FOUND and other.source == jump.source and other.rows == jump.rows
+        if other.kind == FOUND and other.source == jump.source and {jump.rows[row]} <= {*other.rows} <= {*jump.rows}
     ]
 
 

@@ -34,7 +34,7 @@ def visits_of(
         if jump.at is not None:
             turn = round(t / flow.period(values)[0] - flow.phase(values, k)[0])
             visits.append(Visit(jump.source, k, -1, turn))
-            instant.surface = None
+            instant.begin()
         else:
             before = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
             same = i > 0 and t == float(log.crossing_time[i - 1])
@@ -49,26 +49,31 @@ def visits_of(
 
 
 class _AtOnce:
-    """Transitions of one instant: a later one whose surface is that of the first, as the maps between them lead on,
+    """Transitions of one instant: a later one whose surface is that of one before it, as the maps between them lead on,
     follows it at once whatever the states, the time and the active parameters."""
-
-    surface: FloatArray | None = None  # gradient of the first one's, in states, active parameters and time
 
     def __init__(self, active: FloatArray) -> None:
         self.active = active
+        self.begin()
+
+    def begin(self) -> None:
+        """No transition of the instant yet whose surface would be met."""
+        #: Of each that came by itself: gradient of its surface in states, active parameters and time, its indicator,
+        #: the place, and how the maps lead from there on.
+        self.met: list[tuple[FloatArray, float, FloatArray, FloatArray]] = []
 
     def follows(self, jump: Jump, t: float, z: FloatArray, same: bool) -> bool:
-        """Return whether a transition follows the first of its instant: if not of the ``same``, it is the first."""
+        """Return whether a transition follows others of its instant: if not of the ``same``, it is the first."""
         place, n = np.concatenate([z, self.active, [t]]), jump.n
         surface = np.concatenate([jump.h_z, jump.h_p, [jump.h_t]])
         if not same:
-            self.surface, self.h, self.place, self.led = surface, jump.h, place, np.eye(len(place))
-        elif self.surface is None:
-            return False
-        found = same and one_surface(self.surface, self.h, surface @ self.led, jump.h, self.place)
+            self.begin()
+        found = any(one_surface(h_z, h, surface @ led, jump.h, at) for h_z, h, at, led in self.met)
+        if not found and (self.met or not same):
+            self.met.append((surface, jump.h, place, np.eye(len(place))))
         through = np.eye(len(place))
         through[:-1, :-1], through[:n, -1] = jump.R, jump.R_t
-        self.led = through @ self.led
+        self.met = [(h_z, h, at, through @ led) for h_z, h, at, led in self.met]
         return found
 
 

@@ -136,13 +136,14 @@ class Engine(ABC):
         numbers = local.point(mode, float(work.memo[TIME]), work.w[:n], memory, step)
         fired = int(work.tally[CONCERNS])
         met = [] if fired < 0 else decider.met(self.traced.indicator_names[fired], self.traced.indicators[fired])
-        found = begun(numbers, pattern) if starts else decide(numbers, pattern, met)
+        concerned = decider.concerned(waits, mode, met)
+        found = begun(numbers, pattern) if starts else decide(numbers, pattern, met, concerned)
         there, taken = decider.number(base, found.pattern), -1
         self.note_zeros(there, numbers, found.pattern, work)
         if starts:
             work.tally[MODE] = there
         else:
-            taken = decider.found(waits, there, found.struck)
+            taken = decider.found(waits, there, found.struck, concerned)
         if taken < 0 or not found.struck:
             work.w[:n] = found.states
         work.tally[WAITS] = taken + 1

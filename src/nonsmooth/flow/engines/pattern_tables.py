@@ -22,7 +22,7 @@ from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, FOUND, TOGETHER
 if TYPE_CHECKING:
     from nonsmooth.kernels.hybrid.records import Form
     from nonsmooth.system.derived.assembly import Pattern
-    from nonsmooth.system.derived.patterns import Patterns
+    from nonsmooth.system.derived.patterns import Conditions, Patterns
 
 MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
@@ -51,7 +51,7 @@ class PatternTables:
         self.together: list[int] = []  # the transition of each mode that is asked where several elements meet
         self.watched: list[FloatArray] = []  # the rows of the conditions of each mode
         self.meets: list[list[int]] = []  # the conditions of each mode that are looked at then
-        self.answers: dict[tuple[int, int, tuple[int, ...], str], int] = {}
+        self.answers: dict[tuple[int, int, tuple[int, ...], str, Conditions], int] = {}
         self.maps: list[FloatArray] = [self.rows.identity()]
         self.known_maps: dict[int, int] = {}  # by the identity of an array, which the rows keep
         self.made: Any = None  # the maps as kernels take them, as long as none is changed
@@ -108,8 +108,9 @@ class PatternTables:
         else:
             numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]), pattern)
             fired = int(tally[CONCERNS])
-            found = decide(numbers, pattern, self._met(here, fired), self._concerned(lead, fired))
-            taken = self._answer(waits, found)
+            concerned = self._concerned(lead, fired)
+            found = decide(numbers, pattern, self._met(here, fired), concerned)
+            taken = self._answer(waits, found, concerned)
         if taken < 0 or not found.struck:
             self.work.w[: rows.n] = found.states
         self.work.tally[WAITS] = taken + 1
@@ -123,13 +124,16 @@ class PatternTables:
     def _concerned(self, lead: Lead, fired: int) -> list[int] | None:
         """The group of elements of which a condition was met, None: all; others are asked next, at the same instant."""
         if lead.kind != TOGETHER:
-            return self.rows.with_group_of([*self.patterns.elements].index(lead.element))
-        return self.rows.with_group_of(self.patterns.owners[fired]) if fired >= 0 else None
+            return self.rows.with_group_of([*self.patterns.elements].index(lead.element), self.patterns.mode)
+        return self.rows.with_group_of(self.patterns.owners[fired], self.patterns.mode) if fired >= 0 else None
 
-    def _answer(self, waits: int, found: Outcome) -> int:
-        """The transition to which a question has led; it is made where it is new."""
+    def _answer(self, waits: int, found: Outcome, concerned: list[int] | None) -> int:
+        """The transition to which a question has led, by the conditions of those that were asked; it is made where it
+        is new."""
         lead, struck = self.leads[waits], found.struck
-        key = waits, self.place(found.pattern), (found.rubbed is not None, *struck), found.ends
+        owners = self.patterns.owners
+        rows = tuple(row for row in lead.rows if concerned is None or owners[row.indicator] in concerned)
+        key = waits, self.place(found.pattern), (found.rubbed is not None, *struck), found.ends, rows
         if key not in self.answers:
             self.answers[key] = len(self.leads)
             number = 0
@@ -139,7 +143,7 @@ class PatternTables:
                 number = self._map(self.rows.impact(struck, self.patterns.mode))
             change = Reset(struck, rubs=found.rubbed is not None) if struck else None
             names, ends = found.names or lead.element, found.ends or FOUND
-            to = Lead(lead.source, found.pattern, names, lead.rows, ends, change)
+            to = Lead(lead.source, found.pattern, names, rows, ends, change)
             contact = ENDS.index(ends) + DEAD_END if found.ends else int(self.patterns.begins_contact(to))
             way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])

@@ -22,12 +22,13 @@ from functools import cached_property, wraps
 from typing import Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements import Element, Rubbing
 from nonsmooth.system.derived.elements.element import CREEP, THROWN, Condition, Leaving, Place
-from nonsmooth.system.derived.faces import as_sums, independent, least_within, weakest
+from nonsmooth.system.derived.faces import as_sums, independent, least_within, linked, weakest
 
 Pattern = tuple[int, ...]  # the phase of each element
 Method = TypeVar("Method", bound=Callable[..., Any])
@@ -153,6 +154,14 @@ class Assembler(ABC):
         """The direction of an element as numbers, likewise; at the present values of the parameters."""
 
     @abstractmethod
+    def touched(self, part: Part) -> NDArray[np.bool_]:
+        """The states on whose derivatives an element acts."""
+
+    @abstractmethod
+    def involved(self, expression: Any) -> NDArray[np.bool_]:
+        """The states on which an expression depends."""
+
+    @abstractmethod
     def vanishes(self, expression: Any) -> bool:
         """Return whether an expression is zero whatever the state."""
 
@@ -209,6 +218,22 @@ class Assembler(ABC):
     def rate(self, k: int, mode: str) -> Any:
         """The rate that a constraint of element k holds at zero."""
         return self.parts[k].element.rate(self.place(k, mode, (0,) * len(self.parts)))
+
+    @kept
+    def apart(self, mode: str) -> list[list[int]]:
+        """The elements apart by whose forces change whose rates: what one does depends on the phases of its group
+        alone."""
+        acts = np.array([self.touched(part) for part in self.parts])
+        felt = acts.copy()
+        for k, part in enumerate(self.parts):
+            if part.element.held:
+                felt[k] |= self.involved(self.rate(k, mode))
+        speaks = np.array([[other.name in vars(part.element).values() for other in self.parts] for part in self.parts])
+        return linked(felt @ acts.T | speaks)
+
+    def with_group_of(self, k: int, mode: str) -> list[int]:
+        """The elements of the group of one."""
+        return next(some for some in self.apart(mode) if k in some)
 
     def meetings(self, mode: str, pattern: Pattern) -> list[tuple[int, Condition]]:
         """The elements that may be held and are not, with each condition at which they meet what holds them."""

@@ -119,7 +119,7 @@ def _written_out(
     forces: dict[str, dict[str, Any]] = {part.name: {} for part in make.parts}
     transitions: list[Transition | Surface] = []
     kinds: list[str] = []  # of the transitions
-    asked: list[tuple[str, str, str, int]] = []  # mode, kind, condition, the stop that is met or -1
+    asked: list[tuple[str, str, str, int]] = []  # mode, kind, condition, the element or -1
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
@@ -130,7 +130,7 @@ def _written_out(
             for way in make.leaving(k, mode, pattern):
                 if way.phase is None:
                     owner = "" if k in make.held(pattern) else part.name
-                    asked.append((here, ASKED, make.condition(way.conditions, owner), k if owner else -1))
+                    asked.append((here, ASKED, make.condition(way.conditions, owner), k))
                     continue
                 there = make.place(k, mode, pattern).put(way.phase).pattern
                 if (mode, there) not in pairs:

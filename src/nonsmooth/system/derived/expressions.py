@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
@@ -158,6 +159,12 @@ class Expressions(Assembler):
 
     def pushes(self, part: Part, draw: int = 0) -> FloatArray:
         return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))], draw)
+
+    def touched(self, part: Part) -> NDArray[np.bool_]:
+        return np.array([part.direction.get(i, 0) != 0 for i in range(len(self.u))])
+
+    def involved(self, expression: sp.Expr) -> NDArray[np.bool_]:
+        return np.array([symbol in expression.free_symbols for symbol in self.u])
 
     def _numbers(self, expressions: Sequence[Any], draw: int) -> FloatArray:
         """Their values in a state drawn at random; from ``OTHER`` on at parameters drawn at random too."""

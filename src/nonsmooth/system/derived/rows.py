@@ -15,12 +15,12 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, SystemDefinitionError
 from nonsmooth.system.codegen.linear import put_together
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError, kept
-from nonsmooth.system.derived.faces import linked
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.hybrid.records import Form
@@ -235,6 +235,14 @@ class Rows(Assembler):
     def pushes(self, part: Part, draw: int = 0) -> FloatArray:
         return np.asarray(part.direction).real
 
+    def touched(self, part: Part) -> NDArray[np.bool_]:
+        found: NDArray[np.bool_] = part.direction != 0.0
+        return found
+
+    def involved(self, expression: Row) -> NDArray[np.bool_]:
+        found: NDArray[np.bool_] = expression.values[: self.n] != 0.0
+        return found
+
     def vanishes(self, expression: Any) -> bool:
         return not (expression.values.real.any() if isinstance(expression, Row) else expression)
 
@@ -251,16 +259,10 @@ class Rows(Assembler):
 
     @cached_property
     def groups(self) -> list[tuple[list[int], Callable[[Pattern], Any], Any]]:
-        """The elements apart by whose forces change whose rates: what one does depends on the phases of its group
-        alone. Of each group the elements, what takes their phases from a pattern, and the states that they act on."""
-        acts = np.array([part.direction != 0.0 for part in self.parts])
-        felt = acts.copy()
-        for k, part in enumerate(self.parts):
-            if part.element.held:
-                felt[k] |= self.rate(k, self.mode).values[: self.n] != 0.0
-        speaks = np.array([[other.name in vars(part.element).values() for other in self.parts] for part in self.parts])
-        groups = linked(felt @ acts.T | speaks)
-        return [(some, itemgetter(*some), np.flatnonzero(acts[some].any(axis=0))) for some in groups]
+        """Of each group that is :meth:`apart` the elements, what takes their phases from a pattern, and the states that
+        they act on."""
+        acts = self.directions != 0.0
+        return [(some, itemgetter(*some), np.flatnonzero(acts[some].any(axis=0))) for some in self.apart(self.mode)]
 
     @cached_property
     def directions(self) -> FloatArray:
@@ -276,10 +278,6 @@ class Rows(Assembler):
     def group(self) -> dict[int, int]:
         """The number of each element's group."""
         return {k: g for g, (some, *_) in enumerate(self.groups) for k in some}
-
-    def with_group_of(self, k: int) -> list[int]:
-        """The elements of the group of one."""
-        return self.groups[self.group[k]][0]
 
     def phases(self, k: int, pattern: Pattern) -> Any:
         """Those of an element's group."""
