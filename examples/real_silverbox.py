@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 NEEDS = "silverbox_SNLS80mV.csv.gz"
 RATE, FINER, TEST = 610.35, 8, 40_000
 FIRST = 40_700
+MARGIN = 20  # samples of the input on each side of those that are fitted: nobody knows yet how late it is
 
 
 def measured() -> np.ndarray:
@@ -49,8 +50,10 @@ def oscillator() -> ns.System:
     )
 
 
-def finer(V1: np.ndarray) -> ns.Input:
-    return ns.Input(np.arange(FINER * len(V1)) / (FINER * RATE), resample_poly(V1, FINER, 1), delay="late")
+def finer(V1: np.ndarray, begin: int, end: int) -> ns.Input:
+    """The voltage from one sample to another, drawn finer."""
+    some = np.arange(FINER * begin, FINER * end)
+    return ns.Input(some / (FINER * RATE), resample_poly(V1, FINER, 1)[some], delay="late")
 
 
 def main(samples: int = 3000) -> Figure:
@@ -60,11 +63,17 @@ def main(samples: int = 3000) -> Figure:
     V1, V2 = measured().T
     fitted = slice(FIRST, FIRST + samples)
     t = np.arange(len(V1)) / RATE
-    system, drive = oscillator(), {"V1": finer(V1)}
+    system = oscillator()
     found = ns.fit(
-        system, {"V2": (t[fitted], V2[fitted])}, list(system.values), measured=["V2"], inputs=drive, progress=False
+        system,
+        {"V2": (t[fitted], V2[fitted])},
+        list(system.values),
+        measured=["V2"],
+        inputs={"V1": finer(V1, FIRST - MARGIN, FIRST + samples + MARGIN)},
+        progress=False,
     )
     print(found)
+    drive = {"V1": finer(V1, 0, TEST + MARGIN)}
     run = ns.simulate(
         system.with_parameters(found), duration=t[TEST], samples=t[:TEST], inputs=drive, start={"V2": V2[0]}
     )

@@ -120,20 +120,24 @@ def test_a_first_visit_is_shown_round_by_keys_alone_and_the_tour_covers_nothing(
     }"""
     page = new_page(first_visit=True)
     page.open(f"{server.address}&{FEW}")
-    for k, part in enumerate(("parameters", "upper", "plane"), 1):
-        assert page.tab.evaluate(f'document.getElementById("{part}").classList.contains("toured")')
-        assert page.tab.inner_text("#tour-title").startswith(f"{k} / 3")
-        if part == "upper":
-            page.picture("tour")
-        for width, large in ((1280, False), (400, False), (400, True), (1280, True)):
-            page.tab.set_viewport_size({"width": width, "height": 800})
-            seen = f"document.documentElement.classList.contains('large') === {str(large).lower()}"
-            page.tab.evaluate(f"{seen} || document.getElementById('large').click()")  # which keeps the focus
-            page.until(f"innerWidth === {width} && {seen} && ({free})()", 5)
+    for width, large in ((1280, False), (400, False), (400, True), (1280, True)):
+        page.tab.set_viewport_size({"width": width, "height": 800})
+        seen = f"document.documentElement.classList.contains('large') === {str(large).lower()}"
+        page.tab.evaluate(f"{seen} || document.getElementById('large').click()")  # which keeps the focus
+        page.until(f"innerWidth === {width} && {seen}", 5)
+        for k, part in enumerate(("parameters", "upper", "plane"), 1):
+            assert page.tab.evaluate(f'document.getElementById("{part}").classList.contains("toured")')
+            assert page.tab.inner_text("#tour-title").startswith(f"{k} / 3")
+            if part == "upper" and (width, large) == (1280, False):
+                page.picture("tour")
+            page.until(f"({free})()", 5)
             place = box(page, "#tour")
             assert 0 <= place["x"] <= width - place["width"]
             assert 0 <= place["y"] <= 800 - place["height"]
-        page.tab.keyboard.press("Enter")
+            page.tab.keyboard.press("Enter")
+        assert not page.tab.is_visible("#tour")
+        page.tab.evaluate("document.getElementById('help').click()")  # begins again
+    page.tab.keyboard.press("Escape")
     assert not page.tab.is_visible("#tour")
     again(page, f"{server.address}&{FEW}")
 

@@ -30,7 +30,7 @@ def drops(heights=(0.011, 0.009, 0.008, 0.007), c=C_S, seed=0, duration=12):
 
 
 def test_the_supports_damping_by_decrement_and_by_fit():
-    found, decay = support_damping(drops(), test_mass=Quantity(MASS, 1e-4))
+    found, decay = support_damping(drops(duration=8), test_mass=Quantity(MASS, 1e-4))
     assert found.estimate.logarithmic
     assert abs(found.value - C_S) < 3.5 * found.uncertainty < 0.02
     ratio = found.others["damping_ratio"]
@@ -41,7 +41,7 @@ def test_the_supports_damping_by_decrement_and_by_fit():
 
 
 def test_the_test_masss_uncertainty_is_in_it():
-    wide = support_damping(drops(), test_mass=Quantity(MASS, 0.05 * MASS))[0]
+    wide = support_damping(drops((0.011, 0.009), duration=5), test_mass=Quantity(MASS, 0.05 * MASS))[0]
     assert wide.uncertainty / wide.value == pytest.approx(0.05, rel=0.02)
 
 
@@ -111,10 +111,10 @@ def fitted(runs, **options):
 
 @pytest.mark.parametrize("counts", [1, 20])
 def test_a_tap_that_slipped_is_named_and_left_out(counts):
-    runs = taps((0.1, -0.09, 0.08, -0.07, 0.06, -0.05))
+    runs = taps((0.1, -0.09, 0.08, -0.07))
     runs[2] = slipped(runs[2], counts)
     decay = fitted(runs)
-    assert decay.runs == tuple(f"Run #{i}" for i in (1, 2, 4, 5, 6))
+    assert decay.runs == tuple(f"Run #{i}" for i in (1, 2, 4))
     (note,) = decay.notes
     assert "'Run #3'" in note and "left out" in note and "slipped" in note
     assert np.all(np.abs(decay.values - [4.5, 1.04, 0.012, 0.0]) < 4 * np.sqrt(np.diag(decay.covariance)))
