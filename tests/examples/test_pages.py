@@ -21,6 +21,7 @@ LONGEST = 60  # lines of an output: in a notebook the next cell stays in sight
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 #: What a page of more than five seconds does in place of its own; what that block prints is compared where it does all.
 SHORTER = {
+    "a_bench": ("draws=60", "draws=12"),
     "control_based_continuation": ("step=0.3, points=60", "step=0.3, points=3"),
     "sketches_and_animations": ("seconds=5, rate=12", "seconds=0.5, rate=12"),
     "smoothing": ("np.geomspace(1e-4, 1e-1, 7)", "np.geomspace(1e-4, 1e-1, 3)"),

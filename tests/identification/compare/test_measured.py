@@ -17,7 +17,7 @@ from nonsmooth.identification.compare import (
 )
 from nonsmooth.identification.compare import measured as module
 from nonsmooth.recordings import Recording, load_session
-from nonsmooth_savi2007.comparison import gap_reference, session_measurement
+from nonsmooth_savi2007.comparison import GapReference, gap_reference, session_measurement
 from nonsmooth_savi2007.rig import VirtualRig
 from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.figures import TAPS, without_support
@@ -128,12 +128,16 @@ def session(rig: VirtualRig, tmp_path_factory: pytest.TempPathFactory) -> object
     return load_session(write_session(rig, tmp_path_factory.mktemp("lab") / "s", made, title="a test"))
 
 
-def test_the_gap_is_referred_by_string_and_ripple(rig: VirtualRig, session: object) -> None:
+@pytest.fixture(scope="module")
+def reference(session: object) -> GapReference:
+    return gap_reference(session)
+
+
+def test_the_gap_is_referred_by_string_and_ripple(rig: VirtualRig, session: object, reference: GapReference) -> None:
     """a^2/(8 L) - a eps cos(beta)/4: with this ripple most of the string's shift is taken back."""
     a = 0.03896
     string, ripple = a**2 / 8, -a * 0.02 * np.cos(0.3) / 4
     assert mean_position(rig, a) == pytest.approx(string + ripple, abs=3e-7)
-    reference = gap_reference(session)
     value, error = reference.mean(a)
     assert reference.runs == 1
     assert abs(value - (string + ripple)) < 3 * error < 5e-6
@@ -144,10 +148,10 @@ def test_the_gap_is_referred_by_string_and_ripple(rig: VirtualRig, session: obje
     assert gap_reference(session, referred=False).mean(a) == (0.0, 0.0)
 
 
-def test_a_session_is_compared_with_the_model(rig: VirtualRig, session: object) -> None:
+def test_a_session_is_compared_with_the_model(rig: VirtualRig, session: object, reference: GapReference) -> None:
     model = ns.models.discontinuous_support()
     for run, gap, number in (("Run #1", -0.0012, 1), ("Run #2", 0.0006, 2)):
-        measured, settings = session_measurement(session, "section", run, k=8.47)
+        measured, settings = session_measurement(session, "section", run, k=8.47, reference=reference)
         assert settings["g"][0] == pytest.approx(gap, abs=5e-6) and settings["g"][1] > 5e-7
         assert settings["omega"][0] == pytest.approx(frequency(rig, voltage_for(rig, 11.15)), rel=1e-6)
         assert settings["rho"]({"k": 8.0}) == pytest.approx(8.0 * 0.03896)

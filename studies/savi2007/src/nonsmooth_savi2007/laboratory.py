@@ -27,11 +27,12 @@ from nonsmooth_savi2007.rig.notebook import write_session
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
 
-#: Shorter procedures for a quick run: fewer taps, frequency steps and records with contact.
+#: Shorter procedures for a quick run: fewer taps, frequency steps, drops and records with contact.
 _FEWER = {
     "impulse": {"velocities": (0.5, -0.35, 0.2)},
     "response": {"voltages": (3.9, 4.2, 4.4, 4.6, 4.8, 5.1, 5.6)},
-    "contact": {"regimes": ((11.15, 0.039), (9.88, 0.027), (6.0, 0.0165)), "duration": 12.0},
+    "drop": {"n": 3, "duration": 12.0},
+    "contact": {"regimes": ((11.15, 0.039), (9.88, 0.027), (6.0, 0.0165)), "duration": 9.0},
 }
 
 
