@@ -161,7 +161,7 @@ def test_a_process_that_cannot_start_is_given_up(tabs: list[Page], tmp_path: Pat
     tab.say("begin")
     tab.until(lambda: "cannot be started: 3 times" in tab.told("notes").get("page", ""))
     tab.say("set", "p.rho", 0.25)  # and it stays so
-    time.sleep(1.0)
+    time.sleep(0.3)
     assert log.read_text().split() == ["start"] * 3
     assert "cannot be started" in tab.told("notes")["page"]
     assert tab.told("busy") == {"view": ""}

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.recordings.RecordingW
 OPTIONS = {
     "springs": {"n": 3},
     "support": {"n": 3},
-    "drop": {"n": 3},
+    "drop": {"n": 3, "duration": 12.0},
     "impulse": {"velocities": (0.5, -0.5, 0.35, -0.35, 0.2, -0.2), "duration": 8.0},
     "response": {"voltages": (4.0, 5.0, 7.0, 8.5), "duration": 8.0},
     "contact": {"regimes": ((11.15, 0.039), (9.55, 0.027), (6.0, 0.0165)), "duration": 9.0},
