@@ -14,7 +14,7 @@ SMALL = {
     "chart": {"points": 40},
     "basin_fractions": {"points": 14, "starts": 60},
     "element_loads": {"points": 41},
-    "real_silverbox": {"samples": 1500},
+    "real_silverbox": {"samples": 1000},
     "three_masses": {"points": 25, "forces": 9},
 }
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
