@@ -63,6 +63,23 @@ def test_the_diagram_is_a_line_through_the_section_points(shown: str) -> None:
     assert tab.data("columns")["value"] == pytest.approx(np.linspace(0.3, 0.4, 10))
 
 
+def test_a_preview_of_what_was_undone_does_not_stay() -> None:
+    """The diagram of before was there, and has been drawn over by the preview of other values."""
+    tab = opened("&over=rho&low=0.2&high=0.5")
+    before = tab.data("diagram image")
+    tab.act("set", "columns", 12, behind="first look")
+    assert tab.data("diagram image")["stage"] == ["first look"]
+    (number, asked), *_ = tab.page.work.worker.asked
+    assert asked["view"] == "diagram"
+    tab.act("undo")  # which cancels it
+    tab.page.work.take(("cancelled", number, None))
+    tab.finish()
+    after = tab.data("diagram image")
+    assert (after["stage"], after["of"]) == (["judged"], before["of"])
+    np.testing.assert_array_equal(after["image"][0], before["image"][0])
+    assert [words for words, *_ in tab.heard("ui")["legends"]["diagram"]] == ["up", "down"]
+
+
 def test_one_direction_has_one_cloud() -> None:
     tab = opened("&over=rho&low=0.2&high=0.5&direction=up&shown=x")
     for direction, color in (("up", COLORS["first"]), ("down", COLORS["second"])):

@@ -52,19 +52,21 @@ class Tab:
         self.n = 0
         self.act("begin")
 
-    def act(self, do: str, name: str = "", value: Any = None) -> None:
-        """A message of the page; then all work that it makes."""
+    def act(self, do: str, name: str = "", value: Any = None, behind: str = "") -> None:
+        """A message of the page; then all work that it makes, or that up to one request."""
         self.n += 1
         message = json.dumps({"n": self.n, "do": do, "name": name, "value": value})
         self.page.document.get_model_by_name("act").value = message
-        self.finish()
+        self.finish(behind)
 
-    def finish(self) -> None:
+    def finish(self, behind: str = "") -> None:
         worker: Any = self.page.work.worker
         while worker.asked:
             number, asked = worker.asked.pop(0)
             worker.did.append(asked["view"])
             self.page.work.take(("done", number, (compute(asked, lambda done: True), [])))
+            if asked["view"] == behind:
+                return
 
     def event(self, kind: Any, view: str, **values: float) -> None:
         plot = self.page.sheet.views[view].figure.plot

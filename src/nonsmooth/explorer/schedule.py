@@ -150,6 +150,9 @@ class Schedule:
             self.page.sheet.forget(running.view)
         elif kind == "done":
             found, warned = content
+            stages = [stage for stage, view in ORDER.items() if view == ORDER[running.view]]
+            for finer in stages[stages.index(running.view) + 1 :]:  # of other values: it is drawn over
+                self.done.pop(finer, None)
             self.done[running.view] = running.key
             self._failed.pop(running.view, None)
             if warned:
