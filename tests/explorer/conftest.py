@@ -109,11 +109,12 @@ class Page:
     def _shown(self) -> dict[str, Any]:
         """Channels by which one page differs from another at the same place in its history."""
         names = ("ui", "readout", "notes", "recording", "building", "equations")
-        channels = {name: json.loads(self.tab.evaluate(CHANNEL, name) or "null") for name in names}
+        channels = {name: json.loads(self.tab.evaluate(CHANNEL, name) or "null") or {} for name in names}
         for passing in ("heard", "can", "tabs"):
             channels["ui"].pop(passing)
         for hidden in ("chart", "basins"):  # legends of views that nobody sees there
             channels["ui"]["legends"].pop(hidden)
+        channels["recording"].pop("fraction", None)  # of what was done last
         return {**channels, "open": self.tab.locator("dialog[open]").count(), "play": self.tab.inner_text("#play")}
 
     def readout(self) -> dict[str, str]:

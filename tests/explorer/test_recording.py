@@ -136,6 +136,8 @@ def test_a_dropped_recording_lies_over_the_model_and_its_parameters_are_found(pa
     })()""")
     np.testing.assert_allclose([measured[0], measured[1]], [3.69, model], rtol=0.02)
     page.picture("recorded_response")
+    page.tab.click("#recording-remove")  # which no undo does
+    page.tab.wait_for_selector("#recording-body", state="hidden")
 
 
 def test_a_file_that_is_no_recording_is_refused_and_nothing_is_lost(page: Any, rig: Path) -> None:
@@ -191,6 +193,8 @@ def test_a_fit_is_cancelled_and_a_crash_of_it_is_said(page: Any, server: Any, ri
     assert page.tab.inner_text("#recording-found") == ""
     assert page.tab.inner_text("#recording-name") == "rig.csv (synthetic)"
     assert page.value("k") == 8.47
+    page.tab.click("#recording-remove")
+    page.tab.wait_for_selector("#recording-body", state="hidden")
 
 
 @pytest.mark.parametrize("lead", [0.0, 0.37, -0.2])
