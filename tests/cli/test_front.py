@@ -186,7 +186,7 @@ def test_no_value_of_any_key_ends_in_a_traceback(
         (("init", "wrong.py:system"), r"wrong\.py, line 1: BaseException: x"),
         (("init", "nothing.py:system"), "no such file"),
         (("schema", "--out", "."), r"\.: a folder stands there .*; close it where it is open, make room"),
-        (("compare", "odd.toml"), r"\[measured\]: session = 3 must be a text"),
+        (("compare", "odd.toml"), r"\[measured\]: session must be text, not 3"),
         (("run", "a" * 5000), "File name too long"),
         (("run", "odd.nc"), r"odd\.nc: is a saved result and no study file; `nonsmooth show odd\.nc`"),
         (("show", "odd.toml"), r"odd\.toml: is a study file and no result; `nonsmooth run odd\.toml`"),

@@ -15,7 +15,7 @@ from tests.explorer.conftest import HEARD, wait_until
 
 import nonsmooth as ns
 from nonsmooth.explorer.measured import read, strand_distance
-from nonsmooth.explorer.recorded import LARGEST, frequency_of, matched, response_points, samples_of
+from nonsmooth.explorer.recorded import LARGEST, frequency_of, matched
 from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.recordings import Recording
 from nonsmooth_savi2007.rig import write_cap, write_capstone_csv
@@ -224,18 +224,18 @@ def test_channels_are_matched_by_name_and_unit_and_scaled() -> None:
     recorded = read({"content": table, "name": "table.csv"})["recorded"]
     system = ns.models.discontinuous_support()
     setup = matched(recorded, system)
-    assert setup.channels == {"v": "v", "x": "pos"}
-    samples = samples_of(recorded, setup)
+    assert {state: one.channel for state, one in setup.states.items()} == {"v": "v", "x": "pos"}
+    samples = setup.samples
     assert samples is not None
     np.testing.assert_allclose(samples.columns["x"][:3], [1e-3, 2e-3, 3e-3])
     np.testing.assert_allclose(samples.columns["v"][:3], [0.0, 0.01, 0.02])
-    moved = setup.changed("shift.x", "0.5", recorded, system).changed("begin", 4, recorded, system)
-    samples = samples_of(recorded, moved)
+    moved = setup.changed("shift.x", "0.5").changed("begin", 4)
+    samples = moved.samples
     assert samples is not None
     np.testing.assert_allclose([samples.time[0], samples.columns["x"][0]], [4.0, 0.505])
     for name, value in {"channel.x": "__class__", "factor.x": "0", "run": "Run #9", "gain.x": 1, "end": -1}.items():
         with pytest.raises(ValueError, match=r"no channel|every reading equal|no run|is nothing|is empty"):
-            setup.changed(name, value, recorded, system)
+            setup.changed(name, value)
 
 
 def test_a_recorded_drive_sets_the_frequency_of_the_model() -> None:
@@ -262,14 +262,14 @@ def test_measured_responses_of_runs_and_of_a_table_over_frequency(tmp_path: Path
         }
     file = write_capstone_csv(Recording.from_runs(runs, synthetic=True), tmp_path / "steps.csv")
     recorded = read({"content": file.read_bytes(), "name": "steps.csv"})["recorded"]
-    omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")
+    omega, height = matched(recorded, system).response(system.values, "omega", "x")
     np.testing.assert_allclose(omega, [3.0, 5.0], rtol=1e-6)
     np.testing.assert_allclose(height, [0.01, 0.02], rtol=1e-3)
     still = {**system.values, "omega": 0.0}
     for values, over in ((system.values, "rho"), (still, "omega")):
-        assert not len(response_points(recorded, matched(recorded, system), system, values, over, "x")[0])
+        assert not len(matched(recorded, system).response(values, over, "x")[0])
     table = b"frequency (Hz),amplitude (mm)\n" + b"".join(b"%g,%g\n" % (0.5 * k, k) for k in range(1, 12))
     recorded = read({"content": table, "name": "table.csv"})["recorded"]
-    omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")
+    omega, height = matched(recorded, system).response(system.values, "omega", "x")
     np.testing.assert_allclose(omega, np.pi * np.arange(1, 12))
     np.testing.assert_allclose(height, 1e-3 * np.arange(1, 12))

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.cli.files import ANY, TEXT, read_tables, write
+from nonsmooth.cli.files import TEXT, read_tables, write
 from nonsmooth.cli.study import SYSTEM, system_of
 from nonsmooth.errors import unknown
 
@@ -20,12 +20,8 @@ _TABLES: dict[str, Any] = {
     "system": SYSTEM,
     "identified": {"data": TEXT, "session": TEXT},
     "measured": {
-        "session": TEXT,
-        "procedure": TEXT,
-        "run": ANY,
-        "crank_force": ANY,
-        "gap_offset": ANY,
-        "referred": ANY,
+        **dict.fromkeys(("session", "procedure"), TEXT),
+        **dict.fromkeys(("run", "crank_force", "gap_offset", "referred"), Any),
     },
     "output": dict.fromkeys(("data", "figure", "picture", "x", "y"), TEXT),
 }
@@ -155,7 +151,7 @@ def _read(path: Path) -> dict[str, Any]:
 
     ours = ("measured", "theory", "parameters", "options")
     allowed = [name for name in inspect.signature(compare).parameters if name not in ours]
-    known = {**_TABLES, "compare": dict.fromkeys([*allowed, "method", "rtol", "atol"], ANY)}
+    known = {**_TABLES, "compare": dict.fromkeys([*allowed, "method", "rtol", "atol"], Any)}
     document = read_tables(path, known, needed={"system": ("model",), "measured": ("session", "procedure")})
     if "data" not in document.get("identified", {"data": ""}):
         raise ValueError(f'{path}: table [identified] needs data = "..." (a file that `nonsmooth identify` wrote)')

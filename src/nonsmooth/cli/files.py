@@ -8,31 +8,19 @@ import time
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from nonsmooth.errors import check_keys, shortened
+from nonsmooth.errors import check_keys
 
 if TYPE_CHECKING:
     import xarray as xr
 
-#: What a value must be: a check, and words.
-Kind = tuple[Callable[[Any], bool], str]
-ANY: Kind = lambda value: True, "anything"
-TEXT: Kind = lambda value: isinstance(value, str), "a text, a name in quotes"
-NAMES: Kind = (
-    lambda value: isinstance(value, list) and all(isinstance(one, str) for one in value),
-    'a list of names, as ["k", "c", "g"]',
-)
-LENGTH: Kind = lambda value: isinstance(value, int | float) and not isinstance(value, bool), "a length in m"
-QUANTITIES: Kind = (
-    lambda value: isinstance(value, dict),
-    "a table of numbers or of { value = ..., uncertainty = ... }",
-)
+TEXT = Annotated[str, "write a name in quotes"]
 
 
 def read_tables(
     path: Path,
-    known: Mapping[str, Mapping[str, Kind] | None],
+    known: Mapping[str, Mapping[str, Any] | None],
     what: str = "study file",
     needed: Mapping[str, tuple[str, ...]] | None = None,
 ) -> dict[str, dict[str, Any]]:
@@ -41,7 +29,8 @@ def read_tables(
     Parameters
     ----------
     known : mapping
-        The keys of each table and what their values must be; None where the caller checks them.
+        The keys of each table and what they may be, declared as arguments of verbs are (``nonsmooth.system.kinds``);
+        None where the caller checks them.
     needed : mapping, optional
         Keys that must be there, by table.
 
@@ -50,6 +39,8 @@ def read_tables(
     ValueError
         No such file, not TOML, an unknown table or key, a value of another kind; the message names the file.
     """
+    from nonsmooth.system.kinds import reader_of
+
     if path.suffix in (".nc", ".zarr") and path.exists():
         raise ValueError(f"{path}: is a saved result and no {what}; `nonsmooth show {path}` shows it")
     try:
@@ -68,9 +59,10 @@ def read_tables(
         place = f"{path}, table [{name}]"
         check_keys(table, kinds, place, "a key")
         for key, value in table.items():
-            fits, words = kinds[key]
-            if not fits(value):
-                raise ValueError(f"{place}: {key} = {shortened(value)} must be {words}")
+            try:
+                table[key] = reader_of(kinds[key])(value, key)
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{place}: {error}") from None
     for name, keys in (needed or {}).items():
         if missing := [key for key in keys if key not in document.get(name, {})]:
             wanted = " and ".join(f'{key} = "..."' for key in missing)

@@ -4,30 +4,20 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from nonsmooth.cli.files import (
-    LENGTH,
-    NAMES,
-    QUANTITIES,
-    TEXT,
-    keep,
-    put_text,
-    read_tables,
-    with_folder,
-    without_screen,
-)
+from nonsmooth.cli.files import TEXT, keep, put_text, read_tables, with_folder, without_screen
 from nonsmooth.errors import check_keys, unknown
 
-_TABLES = {
+_TABLES: dict[str, Any] = {
     "identify": {
         "session": TEXT,
         "model": TEXT,
-        "parameters": NAMES,
-        "crank_length": LENGTH,
-        "apparatus": QUANTITIES,
+        "parameters": Annotated[Sequence[str], 'a list of names, as ["k", "c", "g"]'],
+        "crank_length": Annotated[float, "a length in m"],
+        "apparatus": Annotated[Mapping, "a table of numbers or of { value = ..., uncertainty = ... }"],
     },
     "output": dict.fromkeys(("data", "table", "figures", "format"), TEXT),
 }

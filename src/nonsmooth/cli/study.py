@@ -17,14 +17,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.cli.files import ANY, TEXT, read_tables, write
+from nonsmooth.cli.files import TEXT, read_tables, write
 from nonsmooth.cli.verb_options import VERBS, options_of
 from nonsmooth.errors import check_keys, shortened, unknown
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SYSTEM = {"model": TEXT, "text": TEXT, "parameters": ANY, "smoothed": ANY}
+SYSTEM = {"model": TEXT, "text": TEXT, "parameters": Any, "smoothed": Any}
 _FORMATS = (".pdf", ".png", ".svg", ".eps", ".ps", ".pgf", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 #: Keys of the table [output], with the endings that a name may have.
 OUTPUT = {"data": (".nc", ".zarr"), "figure": _FORMATS, "store": (".zarr",), "x": (), "y": ()}

@@ -13,17 +13,14 @@ from nonsmooth.explorer.labels import html_of, number, plain_of, rows_of, symbol
 from nonsmooth.explorer.recorded import (
     LARGEST,
     RecordedFile,
-    RecordedStates,
     Setup,
     forcing_period,
     frequency_of,
     matched,
-    response_points,
-    samples_of,
-    unlike,
 )
 from nonsmooth.explorer.work import periods_shown
 from nonsmooth.explorer.worker import Answer, Worker
+from nonsmooth.plot.labels import with_unit
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Page
@@ -34,7 +31,6 @@ class Bench:
 
     def __init__(self, page: Page) -> None:
         self.page = page
-        self.recorded: RecordedFile | None = None
         self.setup: Setup | None = None
         self.laid: Mapping[str, Any] | None = None
         self.doing, self._fraction = "", 0.0
@@ -43,7 +39,6 @@ class Bench:
         self._worker: Worker | None = None
         self._unticked: set[str] = set()
         self._told: list[tuple[str, str]] = []
-        self._samples: tuple[Setup, RecordedStates | None] | None = None
 
     @property
     def actions(self) -> dict[str, Callable[[str, Any], object]]:
@@ -79,22 +74,21 @@ class Bench:
 
     def set(self, name: str, value: Any) -> None:
         """Take the value of a field: ``fit.PARAMETER``, or one of the setup after ``recording.``."""
-        if self.recorded is None or self.setup is None:
+        if self.setup is None:
             raise ValueError("there is no recording yet; drop a file into the page")
         group, _, field = name.partition(".")
         if group == "recording":
-            self.setup = self.setup.changed(field, value, self.recorded, self.page.system)
+            self.setup = self.setup.changed(field, value)
         elif field not in self.page.system.parameters:
             raise ValueError(f"{field[:40]!r} is no parameter of this model")
         else:
             (self._unticked.discard if value else self._unticked.add)(field)
 
     def _fit(self, name: str, value: Any) -> None:
-        samples, state = self.samples(), self.page.state
         ticked = [one for one in self.page.system.parameters if one not in self._unticked]
-        if self.recorded is not None and self.recorded.axis != "time":
+        if self.setup is not None and self.setup.recorded.axis != "time":
             raise ValueError("a table over frequency holds no motion to fit; drop a record over time")
-        if samples is None:
+        if self.setup is None or (samples := self.setup.samples) is None:
             raise ValueError("there is nothing to fit to: choose the channel of a state")
         if not ticked:
             raise ValueError("tick the parameters that are to be found")
@@ -104,7 +98,7 @@ class Bench:
             {
                 "view": "fit",
                 "text": self.page.text,
-                "values": dict(state.values),
+                "values": dict(self.page.state.values),
                 "method": "auto",
                 "eta": 0.0,
                 "parameters": ticked,
@@ -114,7 +108,7 @@ class Bench:
 
     def _remove(self, name: str, value: Any) -> None:
         self._stop()
-        self.recorded = self.setup = self.laid = None
+        self.setup = self.laid = None
         self._told = []
         self.page.notes.pop("recording", None)
 
@@ -162,15 +156,11 @@ class Bench:
         elif kind == "error":
             self.page.notes["recording"] = str(content)
         elif what == "reading":
-            self._has_read(content[0]["recorded"])
+            self.page.notes.pop("recording", None)
+            self.arrange(content[0]["recorded"])
         elif model == self.page.state.model:
             self._has_fitted(content[0])
         self.page.refresh()
-
-    def _has_read(self, recorded: RecordedFile) -> None:
-        self.recorded = recorded
-        self.page.notes.pop("recording", None)
-        self.arrange()
 
     def _has_fitted(self, found: Mapping[str, Any]) -> None:
         """Write the parameters to the sliders, as one step that can be undone, and say how well they are known."""
@@ -184,28 +174,21 @@ class Bench:
 
     # --- what the page asks for and shows
 
-    def arrange(self) -> None:
-        """Find the channels of the present model's states, as after another model was chosen."""
-        self._samples = self.laid = None
+    def arrange(self, recorded: RecordedFile | None = None) -> None:
+        """Find the channels of the present model's states, in another file or as after another model was chosen."""
+        self.laid = None
         self._told = []
         self.page.work.done.pop("recording", None)
         system = self.page.system
         period = forcing_period(system, self.page.state.values)
         times = {} if period is None else frequency_of(system, self.page.state.values, 2 * period)
         self._unticked = set(times) | {name for name, one in system.parameters.items() if one.unit == "kg"}
-        self.setup = None if self.recorded is None else matched(self.recorded, system)
-
-    def samples(self) -> RecordedStates | None:
-        """The recorded states in the units of the model."""
-        if self.recorded is None or self.setup is None:
-            return None
-        if self._samples is None or self._samples[0] is not self.setup:
-            self._samples = self.setup, samples_of(self.recorded, self.setup)
-        return self._samples[1]
+        recorded = recorded or (None if self.setup is None else self.setup.recorded)
+        self.setup = None if recorded is None else matched(recorded, system)
 
     def request(self, orbit: Mapping[str, Any], period: int) -> dict[str, Any] | None:
         """The request that lays the recording over the motion of this request."""
-        samples = self.samples()
+        samples = None if self.setup is None else self.setup.samples
         if samples is None or len(samples.time) < 8:
             return None
         state = self.page.state
@@ -220,15 +203,12 @@ class Bench:
         }
 
     def response(self, over: str, state: str) -> tuple[Any, Any]:
-        """Measured points of the frequency response; see :func:`nonsmooth.explorer.recorded.response_points`."""
-        if self.recorded is None or self.setup is None:
-            return (), ()
-        page = self.page
-        return response_points(self.recorded, self.setup, page.system, page.state.values, over, state)
+        """Measured points of the frequency response; see :meth:`nonsmooth.explorer.recorded.Setup.response`."""
+        return ((), ()) if self.setup is None else self.setup.response(self.page.state.values, over, state)
 
     def put(self, found: Mapping[str, Any]) -> None:
         """Take in what the worker found of the recording beside the motion; nothing where it was removed meanwhile."""
-        self.laid = None if self.recorded is None else found
+        self.laid = None if self.setup is None else found
         self.tell()
 
     def readout(self) -> list[tuple[str, str]]:
@@ -246,11 +226,10 @@ class Bench:
 
     def fields(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Values of the fields of the panel, and the choices of those that have some."""
-        if self.recorded is None or self.setup is None:
+        if (setup := self.setup) is None:
             return {}, {}
-        setup, channels = self.setup, self.recorded.runs[self.setup.run]
-        words = {name: f"{name} ({one.unit})" if one.unit else name for name, one in channels.items()}
-        choices = {"recording.run": dict(zip(self.recorded.runs, self.recorded.runs, strict=True))}
+        words = {name: with_unit(name, one.unit) for name, one in setup.channels.items()}
+        choices = {"recording.run": {run: run for run in setup.recorded.runs}}
         choices |= {f"recording.channel.{state}": {"": "not recorded", **words} for state in setup.states}
         choices["recording.turns"] = {"": "not recorded", **words}
         values = {f"recording.{name}": getattr(setup, name) for name in ("run", "turns", "begin", "end")}
@@ -260,11 +239,10 @@ class Bench:
 
     def _content(self) -> dict[str, Any]:
         busy = {"doing": self.doing, "fraction": round(self._fraction, 3), "most": LARGEST}
-        if self.recorded is None or self.setup is None:
+        if (setup := self.setup) is None:
             return {**busy, "file": ""}
-        recorded, setup, system, symbols = self.recorded, self.setup, self.page.system, symbols_of(self.page.system)
-        laid = self.laid or {"distance": None, "why": "", "curve": {}}
-        remarks = [*unlike(recorded, setup, system), *([laid["why"]] if laid["why"] else [])]
+        recorded, system, laid = setup.recorded, setup.system, self.laid or {"distance": None, "why": ""}
+        remarks = [*setup.unlike(), *filter(None, [laid["why"]])]
         if recorded.axis != "time":
             remarks.append("a table over frequency: it lies over the frequency response")
         if (far := laid["distance"]) is not None:
@@ -279,8 +257,8 @@ class Bench:
             "runs": len(recorded.runs),
             "unit": "s" if recorded.axis == "time" else "Hz",
             "rows": rows_of(system),
-            "shown": [*setup.channels],
-            "ticks": [{"name": name, "html": html_of(symbols[name])} for name in system.parameters],
+            "shown": [*setup.shown],
+            "ticks": [{"name": name, "html": html_of(symbols_of(system)[name])} for name in system.parameters],
             "drive": "" if drive is None else f"forcing period {number(drive, 's', 5)} recorded",
             "found": self._told,
             "remarks": remarks,

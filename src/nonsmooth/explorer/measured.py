@@ -8,9 +8,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nonsmooth as ns
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.explorer.recorded import Channel, RecordedFile, RecordedStates
 from nonsmooth.identification.compare.orbits import fold
@@ -21,7 +21,6 @@ from nonsmooth.recordings.reading import Options
 if TYPE_CHECKING:
     from nonsmooth.explorer.work import Job
 
-FloatArray = NDArray[np.float64]
 _GRID = 64  # phases per forcing period at which motions are compared
 _STRANDS = 60  # forcing periods of a record, and of a motion without a period, that are compared
 _FITTED = 1500  # samples that a fit takes

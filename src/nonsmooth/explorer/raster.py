@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from nonsmooth.arrays import FloatArray
+
 #: A cloud: points (columns, n), a colour "#RRGGBB", and the height of a dot in pixels.
-Layer = tuple[NDArray[np.float64], str, int]
+Layer = tuple[FloatArray, str, int]
 _ALPHA = np.array([0, 150, 205, 255], dtype=np.uint32)  # of 0, 1, 2 and more points in a pixel
 
 
-def drawn(layers: list[Layer], low: float, high: float, height: int) -> NDArray[np.uint32]:
+def drawn(layers: list[Layer], low: float, high: float, height: int) -> Any:
     """Return an RGBA image (height, columns), rows from below, of point clouds laid over each other.
 
     A darker pixel holds more points: in chaos the image is the density.

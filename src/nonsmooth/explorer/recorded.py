@@ -5,18 +5,18 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.explorer.state import number_of
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-FloatArray = NDArray[np.float64]
 LARGEST = 64 << 20  # bytes of a file that the page takes
 _MOST = 6000  # samples that are drawn and compared
 _PREFIXES = {"": 1.0, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "n": 1e-9, "k": 1e3}
@@ -58,12 +58,14 @@ class Shown:
     shift: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Setup:
     """The reading of a recording as the motion of a model.
 
     Attributes
     ----------
+    recorded : RecordedFile
+    system : System
     run : str
     states : mapping
         How each state is shown.
@@ -73,6 +75,8 @@ class Setup:
         The piece in use, in seconds.
     """
 
+    recorded: RecordedFile
+    system: System
     run: str
     states: Mapping[str, Shown]
     turns: str
@@ -80,11 +84,16 @@ class Setup:
     end: float
 
     @property
-    def channels(self) -> dict[str, str]:
+    def shown(self) -> dict[str, Channel]:
         """State to channel, of those that are shown."""
-        return {state: one.channel for state, one in self.states.items() if one.channel}
+        return {state: self.channels[one.channel] for state, one in self.states.items() if one.channel}
 
-    def changed(self, name: str, value: Any, recorded: RecordedFile, system: System) -> Setup:
+    @property
+    def channels(self) -> Mapping[str, Channel]:
+        """Channels of the run."""
+        return self.recorded.runs[self.run]
+
+    def changed(self, name: str, value: Any) -> Setup:
         """The same with another value of a field: ``run``, ``turns``, ``begin``, ``end``, ``channel.STATE``, ....
 
         Raises
@@ -93,8 +102,7 @@ class Setup:
             A field, a state or a channel that does not exist, and text that is no number.
         """
         if name == "run":
-            return matched(recorded, system, _known(value, recorded.runs, "run"))
-        channels = recorded.runs[self.run]
+            return matched(self.recorded, self.system, _known(value, self.recorded.runs, "run"))
         if name in ("begin", "end"):
             ends: dict[str, Any] = {name: number_of(value, name)}
             made = replace(self, **ends)
@@ -102,20 +110,68 @@ class Setup:
                 raise ValueError(f"the piece from {made.begin:g} to {made.end:g} s is empty")
             return made
         if name == "turns":
-            return replace(self, turns=_known(value, ["", *channels], "channel"))
+            return replace(self, turns=_known(value, ["", *self.channels], "channel"))
         what, _, state = name.partition(".")
         if what not in ("channel", "factor", "shift") or state not in self.states:
             raise ValueError(f"{name[:40]!r} is nothing that a recording has")
-        new: dict[str, Any]
-        if what == "channel":
-            new = {what: _known(value, ["", *channels], "channel")}
-            if value:
-                new["factor"] = _factor(channels[value].unit, system.states[state]) or 1.0
-        else:
-            new = {what: number_of(value, name)}
-            if new == {"factor": 0}:
-                raise ValueError(f"{name} = 0 makes every reading equal; give how much of the state one unit shows")
+        new: dict[str, Any] = {what: value}
+        if what != "channel":
+            new[what] = number_of(value, name)
+        elif _known(value, ["", *self.channels], "channel"):
+            new["factor"] = _factor(self.channels[value].unit, self.system.states[state]) or 1.0
+        if new == {"factor": 0}:
+            raise ValueError(f"{name} = 0 makes every reading equal; give how much of the state one unit shows")
         return replace(self, states={**self.states, state: replace(self.states[state], **new)})
+
+    @cached_property
+    def samples(self) -> RecordedStates | None:
+        """The piece in use, in the states' units; at most the last ``_MOST`` samples. None where no state is shown."""
+        if not self.shown or self.recorded.axis != "time":
+            return None
+        every = np.unique(np.concatenate([one.time for one in self.shown.values()]))
+        time = every[(every >= self.begin) & (every <= self.end)][-_MOST:]
+        columns = {}
+        for state, one in self.shown.items():
+            columns[state], inside = np.full(len(time), np.nan), np.isin(one.time, time)
+            readings = self.states[state].factor * one.values[inside] + self.states[state].shift
+            columns[state][np.searchsorted(time, one.time[inside])] = readings
+        return RecordedStates(time, columns, self.channels[self.turns].time if self.turns else np.empty(0))
+
+    def response(self, values: Mapping[str, float], over: str, state: str) -> tuple[FloatArray, FloatArray]:
+        """Measured response of a state: values of the parameter that sets the forcing period, and amplitudes.
+
+        Each run with turns of the drive is one point, half its peak-to-peak value at the mean period of its turns; the
+        run in use without them is a point at the model's own period. A table over frequency holds its points. Where
+        ``over`` does not set the forcing period, or the state was not recorded, there are none.
+        """
+        name, factor = self.states[state].channel, abs(self.states[state].factor)
+        now = forcing_period(self.system, values)
+        points: list[tuple[float, float]] = []
+        for run, channels in self.recorded.runs.items():
+            if name not in channels or now is None:
+                continue
+            one = channels[name]
+            inside = (one.time >= self.begin) & (one.time <= self.end) if run == self.run else slice(None)
+            axis, readings = one.time[inside], one.values[inside]
+            turns = channels[self.turns].time if self.turns in channels else ()
+            if self.recorded.axis != "time":
+                points += [(1 / f, factor * a) for f, a in zip(axis, readings, strict=True) if f > 0 and np.isfinite(a)]
+            elif len(readings) and ((counted := len(turns) >= 3) or run == self.run):
+                period = float(np.diff(turns).mean()) if counted else now
+                points.append((period, 0.5 * factor * float(np.nanmax(readings) - np.nanmin(readings))))
+        found = [(frequency_of(self.system, values, period).get(over), height) for period, height in points]
+        places, heights = np.array([one for one in found if one[0] is not None], float).reshape(-1, 2).T
+        return places, heights
+
+    def unlike(self) -> list[str]:
+        """Sentences on channels whose unit is not the state's, while their factor is still 1."""
+        return [
+            f"{self.states[state].channel} is in {one.unit or 'no unit'}, {state} in {unit}: give the factor"
+            for state, one in self.shown.items()
+            if self.states[state].factor == 1.0
+            and (unit := self.system.states[state]) not in ("", "1")
+            and not _factor(one.unit, unit)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,13 +191,14 @@ class RecordedStates:
     time: FloatArray
     columns: Mapping[str, FloatArray]
     turns: FloatArray
-    key: str = field(init=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def key(self) -> str:
+        """Hash of all values."""
         digest = hashlib.sha256()
         for name, values in {"": self.time, **self.columns, "turns": self.turns}.items():
             digest.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
-        object.__setattr__(self, "key", digest.hexdigest())
+        return digest.hexdigest()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, RecordedStates) and self.key == other.key
@@ -154,80 +211,24 @@ def matched(recorded: RecordedFile, system: System, run: str = "") -> Setup:
     """The setup that names and units suggest."""
     run = run or next(iter(recorded.runs))
     channels = recorded.runs[run]
-    turns = next((name for name, one in channels.items() if name.casefold().startswith("turn")), "")
+    turns = next((name for name in channels if name.casefold().startswith("turn")), "")
     free = [name for name in channels if name != turns]
     found: dict[str, str] = {}
     for state in system.states:
-        same = [name for name in free if name.casefold() == state.casefold()]
-        if same:
+        if same := [name for name in free if name.casefold() == state.casefold()]:
             found[state] = same[0]
     for state, unit in system.states.items():
-        alike = [
-            name
-            for name in free
-            if name not in found.values() and unit not in ("", "1") and _factor(channels[name].unit, unit)
-        ]
-        if state not in found and alike:
-            found[state] = alike[0]
+        left = [name for name in free if name not in found.values() and _factor(channels[name].unit, unit)]
+        if state not in found and unit not in ("", "1") and left:
+            found[state] = left[0]
     if not found and free:
         likely = [name for name in free if recorded.axis != "time" and "amplitude" in name.casefold()]
         found[next(iter(system.states))] = (likely or free)[0]
     shown = dict.fromkeys(system.states, Shown()) | {
         state: Shown(name, _factor(channels[name].unit, system.states[state]) or 1.0) for state, name in found.items()
     }
-    times = [channels[name].time for name in found.values()]
-    begin, end = (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 1.0)
-    return Setup(run, shown, turns, float(begin), float(end))
-
-
-def samples_of(recorded: RecordedFile, setup: Setup) -> RecordedStates | None:
-    """The piece in use, in the states' units; at most the last ``_MOST`` samples. None where no state is shown."""
-    channels = recorded.runs[setup.run]
-    if not setup.channels or recorded.axis != "time":
-        return None
-    clocks = {state: channels[name].time for state, name in setup.channels.items()}
-    every = np.unique(np.concatenate(list(clocks.values())))
-    time = every[(every >= setup.begin) & (every <= setup.end)][-_MOST:]
-    columns = {}
-    for state, name in setup.channels.items():
-        column = np.full(len(time), np.nan)
-        own, inside = clocks[state], np.isin(clocks[state], time)
-        values = channels[name].values[inside]
-        column[np.searchsorted(time, own[inside])] = setup.states[state].factor * values + setup.states[state].shift
-        columns[state] = column
-    return RecordedStates(time, columns, channels[setup.turns].time if setup.turns else np.empty(0))
-
-
-def response_points(
-    recorded: RecordedFile, setup: Setup, system: System, values: Mapping[str, float], over: str, state: str
-) -> tuple[FloatArray, FloatArray]:
-    """Measured response of a state: values of the parameter that sets the forcing period, and amplitudes.
-
-    Each run with turns of the drive is one point, half its peak-to-peak value at the mean period of its turns; the run
-    in use without them is a point at the model's own period. A table over frequency holds its points. Where ``over``
-    does not set the forcing period, or the state was not recorded, there are none.
-    """
-    nothing = np.empty(0), np.empty(0)
-    name, factor = setup.states[state].channel, abs(setup.states[state].factor)
-    now = forcing_period(system, values)
-    if not name or now is None:
-        return nothing
-    points: list[tuple[float, float]] = []
-    for run, channels in recorded.runs.items():
-        if name not in channels:
-            continue
-        one = channels[name]
-        inside = (one.time >= setup.begin) & (one.time <= setup.end) if run == setup.run else slice(None)
-        axis, readings = one.time[inside], one.values[inside]
-        turns = channels[setup.turns].time if setup.turns in channels else ()
-        if recorded.axis != "time":
-            points += [(1 / f, factor * a) for f, a in zip(axis, readings, strict=True) if f > 0 and np.isfinite(a)]
-        elif len(readings) and ((counted := len(turns) >= 3) or run == setup.run):
-            period = float(np.diff(turns).mean()) if counted else now
-            points.append((period, 0.5 * factor * float(np.nanmax(readings) - np.nanmin(readings))))
-    found = [(frequency_of(system, values, period).get(over), height) for period, height in points]
-    there = [(place, height) for place, height in found if place is not None]
-    return (np.array([place for place, _ in there]), np.array([height for _, height in there])) if there else nothing
+    times = np.concatenate([channels[name].time for name in found.values()] or [np.array([0.0, 1.0])])
+    return Setup(recorded, system, run, shown, turns, float(times.min()), float(times.max()))
 
 
 def frequency_of(system: System, values: Mapping[str, float], period: float) -> dict[str, float]:
@@ -254,18 +255,6 @@ def forcing_period(system: System, values: Mapping[str, float]) -> float | None:
     except ZeroDivisionError:
         return None
     return period if period is not None and 0 < period < math.inf else None
-
-
-def unlike(recorded: RecordedFile, setup: Setup, system: System) -> list[str]:
-    """Sentences on channels whose unit is not the state's, while their factor is still 1."""
-    channels = recorded.runs[setup.run]
-    return [
-        f"{name} is in {channels[name].unit or 'no unit'}, {state} in {system.states[state]}: give the factor"
-        for state, name in setup.channels.items()
-        if setup.states[state].factor == 1.0
-        and system.states[state] not in ("", "1")
-        and not _factor(channels[name].unit, system.states[state])
-    ]
 
 
 def _factor(unit: str, wanted: str) -> float | None:

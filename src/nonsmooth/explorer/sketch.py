@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from functools import lru_cache
+from html import escape
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -111,12 +112,8 @@ def equations_of(system: System) -> list[tuple[str, str]]:
         if rows:
             found.append(("" if len(fields) == 1 else mode.replace("_", " "), rows))
     if loads is not None and loads.elements:
-        found += [(one.name, _escaped(one.text)) for one in loads.elements]
+        found += [(one.name, escape(one.text)) for one in loads.elements]
     else:
         indicators = [*zip(traced.indicator_names, traced.indicators, strict=True)][:_LONGEST]
         found.append(("changes at", "".join(equation("<mn>0</mn>", e) for _, e in indicators)))
     return found
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, only_states, variable_along
+from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.labels import words_of_flags
 from nonsmooth.system.kinds import above
 from nonsmooth.tables.quantities import dataset_of
@@ -17,7 +18,6 @@ from nonsmooth.tables.quantities import dataset_of
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
 #: Marker and words of each kind of special point.
 MARKS = {
@@ -117,7 +117,7 @@ def check_axis(branch: xr.Dataset, parameter: str) -> None:
         raise ValueError(f"the result is over {parameter!r}, this branch over {of!r}: they share no axis")
 
 
-def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
+def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> FloatArray:
     """One line for each section point of the orbit, (lines, point); an equilibrium is its own maximum and minimum."""
     if "eigenvalues" in result:
         rest = result["u"].sel(state=name).values.astype(float)
@@ -132,7 +132,7 @@ def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.flo
 
 
 def _mark_special(
-    ax: Axes, result: xr.Dataset, x: Any, heights: NDArray[np.float64], marks: Mapping[str, tuple[str, str]]
+    ax: Axes, result: xr.Dataset, x: Any, heights: FloatArray, marks: Mapping[str, tuple[str, str]]
 ) -> None:
     """The special points on each of the lines (lines, point), every kind with its own sign and words."""
     at = result["special_point"].values.astype(int)
@@ -141,11 +141,10 @@ def _mark_special(
         here = at[kinds == kind]
         marker, words = marks.get(kind, (_OTHER, kind.replace("_", " ")))
         size = _SIZES.get(kind, _SIZE)
-        rows = heights[:, here]
-        style.mark(ax, (np.broadcast_to(x[here], rows.shape), rows), marker, words, size, zorder=5.7 - 0.1 * size)
+        style.mark(ax, (x[here], heights[:, here]), marker, words, size, zorder=5.7 - 0.1 * size)
 
 
-def lines_of(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
+def lines_of(result: xr.Dataset) -> list[tuple[str, IntArray]]:
     """The style of each kind of line, and the points that it joins (-1: a break).
 
     A segment that begins at a special point, where stability changes, is of the kind of its end.
@@ -170,7 +169,7 @@ def lines_of(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
     return found
 
 
-def with_breaks(values: NDArray[np.float64], at: NDArray[np.intp]) -> NDArray[np.float64]:
+def with_breaks(values: FloatArray, at: IntArray) -> FloatArray:
     """Return the values at points of a line, NaN at its breaks."""
     return np.where(at < 0, np.nan, values[at])
 
@@ -225,16 +224,16 @@ def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: Any = No
     over_chart = any(isinstance(item, QuadMesh) for item in ax.collections)
     looks: dict[str, Any] = {"path_effects": style.halo(1.8)} if over_chart else {}
     looks |= {"color": color or style.COLORS[shade], "linewidth": 1.0, "zorder": 3}
-    style.line(ax, result[x].values, result[y].values, line, label=style.once(ax, words), **looks)
+    values, heights = result[x].values, result[y].values
+    style.line(ax, values, heights, line, label=style.once(ax, words), **looks)
     if special:
-        _mark_special(ax, result, result[x].values, result[y].values[None], POINTS)
+        _mark_special(ax, result, values, heights[None], POINTS)
     name_plane(ax, result, x, y)
     own, before = ax.get_legend_handles_labels()[1], ax.get_legend()
     if before is not None and not {text.get_text() for text in before.get_texts()} <= set(own):
         ax.add_artist(before)  # the legend of a chart stays, and that of the curves stands below it
         before.set_clip_on(False)  # else the layout takes it for a thing within the axes, and cuts it
-    below: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (1.01, 0.0), "borderaxespad": 0.0}
-    ax.legend(**(below if over_chart else {"loc": "best"}))
+    ax.legend(**(style.beside(0.0) if over_chart else {}))
 
 
 @figure(ratio=0.9)
@@ -269,10 +268,10 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: Annotated[float, a
     if along:
         name = str(data.attrs["parameter"])
         shade = np.broadcast_to(data[name].values[:, None], mu.shape)
-        dots = ax.scatter(x.ravel(), y.ravel(), c=shade.ravel(), s=4, cmap="viridis", linewidths=0, zorder=3)
+        dots = ax.scatter(x, y, c=shade, s=4, cmap="viridis", linewidths=0, zorder=3)
         name_axes(ax.figure.colorbar(dots, ax=ax).ax, y=name_and_unit(data, name))
     else:
-        ax.plot(x.ravel(), y.ravel(), "o", color=style.COLORS["first"], markersize=3.5, zorder=3)
+        ax.plot(x[0], y[0], "o", color=style.COLORS["first"], markersize=3.5, zorder=3)
     ax.set(xlabel=r"Re $\mu$", ylabel=r"Im $\mu$", xlim=(-half, half), ylim=(-half, half), aspect="equal")
     if outside:
         ax.set_title(f"{outside} of {len(mu)} points reach outside" if along else "a multiplier lies outside")
@@ -293,7 +292,7 @@ def manifolds(ax: Axes, result: xr.Dataset, *, x: Name | None = None, y: Name | 
     """
     names = only_states(result, x, y)
     kinds = words_of_flags(result["manifold"])
-    columns, saddle = ([result[key].sel(state=name).values for name in names] for key in ("section", "orbit_section"))
+    sections, saddle = (columns(result, key, names) for key in ("section", "orbit_section"))
     numbers, piece = result["arc_number"].values, result["piece"].values
     for number, code in enumerate(result["manifold"].values):
         chosen = np.flatnonzero(numbers == number)
@@ -304,7 +303,7 @@ def manifolds(ax: Axes, result: xr.Dataset, *, x: Name | None = None, y: Name | 
         j = int(result["orbit_point"].values[number])
         xs, ys = (
             np.insert(np.insert(values[chosen], breaks, np.nan), 0, own[j])
-            for values, own in zip(columns, saddle, strict=True)
+            for values, own in zip(sections, saddle, strict=True)
         )
         kind = kinds[int(code)]
         color, above = ("second", 3) if kind == "unstable" else ("first", 2)
@@ -376,14 +375,14 @@ def controlled_branch(
             here = result["stability"].values == kind
             if here.any():
                 bars = 2 * result["amplitude_uncertainty"].values[here]
-                looks: dict[str, Any] = {"color": style.COLORS["first"], "face": face, "size": 3.5, "label": words}
-                style.points(ax, values[here], amplitude[here], yerr=bars, **looks)
+                heights, color = amplitude[here], style.COLORS["first"]
+                style.points(ax, values[here], heights, yerr=bars, color=color, face=face, size=3.5, label=words)
         if result.sizes["special"]:
-            at, bars = result["special_point"].values, 2 * result["special_value_uncertainty"].values
-            looks = {"color": style.COLORS["second"], "face": "none", "size": 6.5, "mark": "D", "zorder": 5}
-            style.points(ax, result["special_value"].values, amplitude[at], xerr=bars, label="fold", **looks)
+            heights, bars = amplitude[result["special_point"].values], 2 * result["special_value_uncertainty"].values
+            looks = {"color": style.COLORS["second"], "face": "none", "mark": "D", "label": "fold"}
+            style.points(ax, result["special_value"].values, heights, xerr=bars, size=6.5, zorder=5, **looks)
         name_plane(ax, result, parameter, state, "amplitude of ")
-    ax.legend(loc="best")
+    ax.legend()
 
 
 def _with_margin(values: Any) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, one_of, only_states, with_unit
+from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_plane, one_of, only_states, with_unit
 from nonsmooth.plot.style import ABOVE
 from nonsmooth.plot.trajectories import edge_of, shade_zone
 from nonsmooth.system.kinds import above, at_least
@@ -42,9 +42,9 @@ def shade_reach(ax: Axes, result: xr.Dataset, x: Any, **looks: Any) -> None:
         ax.fill_between(x, result["theory_low"], result["theory_high"], linewidth=0, **looks)
 
 
-def one_phase(result: xr.Dataset, name: str, phase: int = 0) -> xr.DataArray:
-    """A variable at one of the sections that were compared."""
-    return one_of(result[name], "section_phase", phase, "phase")
+def one_phase(result: xr.Dataset, phase: int = 0) -> Any:
+    """A comparison at one of its sections."""
+    return one_of(result, "section_phase", phase, "phase")
 
 
 @figure()
@@ -77,9 +77,8 @@ def comparison_time(
             shade_reach(ax, part, phase[shown], color=THEORY, alpha=0.25, label=_band(result))
             ax.plot(phase[shown], values[shown], color=THEORY, label="theory")
         else:
-            some = shown[:: max(1, len(shown) // 120)]
-            looks: dict[str, Any] = {"color": MEASURED, "markersize": 1.6, "markeredgewidth": 0.0}
-            ax.plot(phase[some], values[some], "o", label=measured_label(result), **looks)
+            some, word = shown[:: max(1, len(shown) // 120)], measured_label(result)
+            ax.plot(phase[some], values[some], "o", label=word, color=MEASURED, markersize=1.6, markeredgewidth=0)
     ax.margins(x=0)
     style.make_room(ax, 0.22)
     ax.legend(loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.4)
@@ -113,15 +112,14 @@ def comparison_phase_portrait(
     names = only_states(result, x, y)
     closed = "phase" in result.coords
     for side, color in (("theory", THEORY), ("measured", MEASURED)):
-        curves = [result[f"{side}_orbit"].sel(state=name).values for name in names]
+        curves = columns(result, f"{side}_orbit", names)
         if closed:
             curves = [np.append(curve, curve[0]) for curve in curves]
         ours = side == "theory"
         word, wide, line = ("theory", 1.2, "-") if ours else (measured_label(result), 0.6, (0, (4, 2)))
         looks: dict[str, Any] = {"linewidth": wide, "linestyle": line} if closed else {"linewidth": 0.4}
         ax.plot(*curves, color=color, label=word, **looks)
-        section = one_phase(result, f"{side}_section")
-        points = [section.sel(state=name).values for name in names]
+        points = columns(one_phase(result), f"{side}_section", names)
         # Rings about the few points of a closed orbit; of an attractor a cloud, the measured points on it.
         size, face, edge = (4.5, "none", 0.9) if ours and closed else (0.9 if ours else 2.0, color, 0)
         looks = {"color": color, "markersize": size, "markerfacecolor": face, "markeredgewidth": edge}
@@ -150,18 +148,16 @@ def comparison_section(
     check_kind(result, "motion")
     names = only_states(result, x, y)
     few = int(result["theory_period_number"])
-    measured, theory = (
-        [one_phase(result, f"{side}_section", phase).sel(state=name).values for name in names]
-        for side in ("measured", "theory")
-    )
+    here = one_phase(result, phase)
+    measured, theory = (columns(here, f"{side}_section", names) for side in ("measured", "theory"))
     style.cloud(ax, measured, 1.7, MEASURED, measured_label(result))
     if few:  # points that come round again: rings about the measured ones
-        looks: dict[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.9}
-        ax.plot(*(column[:few] for column in theory), "o", color=THEORY, label="theory", **looks)
+        x_ring, y_ring = (column[:few] for column in theory)
+        looks: dict[str, Any] = {"color": THEORY, "markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.9}
+        ax.plot(x_ring, y_ring, "o", label="theory", **looks)
     else:
         style.cloud(ax, theory, 1.2, THEORY, "theory")
-    keys = "energy_distance_matched", "measured_halves_p95"
-    distance, limit = (float(one_phase(result, name, phase)) for name in keys)
+    distance, limit = (float(here[name]) for name in ("energy_distance_matched", "measured_halves_p95"))
     if np.isfinite(distance):
         ax.set_title(f"energy distance {distance:.3f}; 95 % of its own halves below {limit:.3f}", loc="left")
     ax.legend(markerscale=1 if few else 4, loc="best")
@@ -175,18 +171,17 @@ def comparison_distances(ax: Axes, result: xr.Dataset) -> None:
     The bars of the halves reach from their median to their 95th percentile.
     """
     check_kind(result, "motion")
-    word = "synthetic" if measured_label(result) != "measured" else "measured"
+    here, word = one_phase(result), "synthetic" if measured_label(result) != "measured" else "measured"
     names: list[str] = []
     for side, own, color in (("measured", word, MEASURED), ("theory", "theory", THEORY)):
-        ends = [float(one_phase(result, f"{side}_halves_{q}")) for q in ("median", "p95")]
+        ends = [float(here[f"{side}_halves_{q}"]) for q in ("median", "p95")]
         ax.plot(ends, [len(names)] * 2, "|-", color=color, linewidth=1.2, markersize=8)
         names.append(f"halves, {own}")
     if "draw_energy_distance" in result:
-        draws = one_phase(result, "draw_energy_distance").values
+        draws = here["draw_energy_distance"].values
         ax.plot(draws, np.full(draws.shape, len(names)), ".", color=style.COLORS["muted"], markersize=3)
         names.append("drawn parameters")
-    distance = float(one_phase(result, "energy_distance_matched"))
-    ax.plot([distance], [len(names)], "D", color=style.COLORS["second"], markersize=4)
+    ax.plot([float(here["energy_distance_matched"])], [len(names)], "D", color=style.COLORS["second"], markersize=4)
     names.append(f"{word} to theory")
     ax.set_yticks(range(len(names)), names)
     ax.set(ylim=(-0.6, len(names) - 0.4), xlabel="energy distance (scaled)")
@@ -228,12 +223,10 @@ def comparison_diagram(
     check_kind(result, "diagram")
     parameter = str(result["theory_section"].dims[0])
     (name,) = only_states(result, y)
-    points = result["theory_section"].sel(state=name).transpose(..., parameter)
-    at = np.broadcast_to(result[parameter].values, points.shape)
-    style.cloud(ax, (at, points.values), 0.9, THEORY, "theory")
-    looks: dict[str, Any] = {"color": THEORY, "alpha": 0.12, "zorder": 0, "label": "reach for drawn parameters"}
-    shade_reach(ax, result.sel(state=name), result[parameter].values, **looks)
-    read = result[f"measured_{parameter}"], result["measured_section"].sel(state=name)
+    values, one = result[parameter].values, result.sel(state=name)
+    style.cloud(ax, (values, one["theory_section"].transpose(..., parameter).values), 0.9, THEORY, "theory")
+    shade_reach(ax, one, values, color=THEORY, alpha=0.12, zorder=0, label="reach for drawn parameters")
+    read = one[f"measured_{parameter}"].values, one["measured_section"].values
     style.cloud(ax, read, size, MEASURED, measured_label(result))
     _flips(ax, result)
     ax.margins(x=0)

@@ -89,11 +89,6 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
     return made
 
 
-def _scattered(line: Any) -> bool:
-    """Points that no line joins."""
-    return hasattr(line, "get_marker") and line.get_linestyle() == "None"
-
-
 def _finish(ax: Axes, there: set[Any], look: Mapping[str, Any], name: str) -> None:
     """Apply what all figures take; properties of lines to those drawn, bars and entries of the legend among them."""
     from matplotlib.collections import LineCollection
@@ -103,11 +98,11 @@ def _finish(ax: Axes, there: set[Any], look: Mapping[str, Any], name: str) -> No
     new: list[Any] = [one for one in (*ax.lines, *bars) if one not in there]
     if looks and not new:
         raise TypeError(f"{', '.join(looks)}: no property of this picture, in which {name} has drawn no line or point")
-    if "linestyle" in looks and all(map(_scattered, new)):
+    if "linestyle" in looks and all(map(style.scattered, new)):
         raise TypeError(f"linestyle: no property of this picture, in which {name} has drawn no line, but points alone")
     signs: list[Any] = [] if shown is None else [one for one in shown.legend_handles if hasattr(one, "get_markersize")]
     for line in (*new, *signs) if looks else ():
-        kept = {"linestyle"} if _scattered(line) else set()  # points are not joined
+        kept = {"linestyle"} if style.scattered(line) else set()  # points are not joined
         line.set(**{key: value for key, value in looks.items() if hasattr(line, f"set_{key}") and key not in kept})
         if "marker" in looks and hasattr(line, "set_marker"):  # at all points; a cross is nothing but an edge
             line.set(markevery=None, markeredgewidth=0.7)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -94,6 +95,17 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
     if name in others:
         return result[name]
     raise ValueError(f"{name!r} is neither a state nor an output of this result; states: {states}; others: {others}")
+
+
+def columns(result: xr.Dataset, variable: str, names: Iterable[str]) -> list[Any]:
+    """The values of several states or outputs, as :func:`column` finds each."""
+    return [column(result, variable, name).values for name in names]
+
+
+def by_direction(result: xr.Dataset, array: xr.DataArray) -> list[tuple[str, xr.DataArray]]:
+    """A quantity of a sweep in each of its directions."""
+    words = np.atleast_1d(result["direction"].values).astype(str).tolist()
+    return [(word, one_of(array, "direction", i, "direction")) for i, word in enumerate(words)]
 
 
 def variable_along(result: xr.Dataset, variable: str, verb: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth.errors import shortened
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import Name, in_lines, name_and_unit, name_axes, name_plane, one_of, only_states
+from nonsmooth.plot.labels import Name, columns, in_lines, name_and_unit, name_axes, name_plane, one_of, only_states
 from nonsmooth.plot.prefixes import PREFIXES, power_for
 from nonsmooth.results.labels import in_words
 from nonsmooth.system.kinds import above, at_least
@@ -111,8 +111,7 @@ def chart(
         classes, entries = classes_of(one.transpose(second, first, ...))
         cells(ax, x, values_of_y, classes, [color for _, color in entries])
         there = [_box(color, words.replace("no period", "none found")) for words, color in legend_of(classes, entries)]
-        beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
-        ax.legend(handles=there, title="period", handlelength=1.0, handleheight=1.0, **beside)
+        ax.legend(handles=there, title="period", handlelength=1.0, handleheight=1.0, **style.beside(1.0))
     else:
         table, extend = values.transpose(second, first).values.astype(float), "neither"
         looks: dict[str, Any] = {"cmap": "cividis"}
@@ -122,8 +121,8 @@ def chart(
             limit = float(np.percentile(finite, 98)) if len(finite) else 1.0
             looks, extend = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}, "both"
         bar = ax.figure.colorbar(cells(ax, x, values_of_y, table, **looks), ax=ax, extend=extend)
-        words = in_lines(str(values.attrs.get("long_name", show)), _LONGEST)
-        name_axes(bar.ax, y=(words, str(values.attrs.get("units", "1"))))
+        words = in_lines(values.attrs.get("long_name", show), _LONGEST)
+        name_axes(bar.ax, y=(words, values.attrs.get("units", "1")))
     for name, (heights, levels) in lines.items():
         _contours(ax, heights.transpose(second, first), levels, name)
     if inside is not None:
@@ -145,13 +144,12 @@ def held(result: xr.Dataset, region: Any) -> Any:
 
 def _contours(ax: Axes, heights: xr.DataArray, levels: Any, name: str) -> None:
     """Lines of equal value, each with its value in the unit that suits it."""
-    unit = str(heights.attrs.get("units", "1"))
+    unit = heights.attrs.get("units", "1")
     y, x = (heights[dim].values for dim in heights.dims)
     if min(heights.shape) < 2:
         raise ValueError(f"contours of {name} take two values and more of each parameter, not {dict(heights.sizes)}")
-    found = ax.contour(
-        x, y, heights.values.astype(float), levels, colors=style.COLORS["section"], linestyles="--", linewidths=0.8
-    )
+    looks: dict[str, Any] = {"colors": style.COLORS["section"], "linestyles": "--", "linewidths": 0.8}
+    found = ax.contour(x, y, heights.values.astype(float), levels, **looks)
     found.set_path_effects(style.halo())
     power = power_for(unit, float(np.abs(levels).max()))
     words = {at: f"{at / 10.0**power:g} {PREFIXES[power]}{unit.removesuffix('1')}".strip() for at in found.levels}
@@ -234,13 +232,12 @@ def basins(ax: Axes, result: xr.Dataset, *, size: Annotated[float, above(0)] = 3
     colors = [palette.attractor_color(k) for k in range(result.sizes["attractor"])]
     fates = [palette.DIVERGED, palette.UNKNOWN]
     cells(ax, result[first].values, result[second].values, np.maximum(labels, -2), [*fates, *colors], -2)
-    limits = {"xlim": ax.get_xlim(), "ylim": ax.get_ylim()}
+    ax.axis(ax.axis())  # the cells fill the axes, whatever lies on them
     handles: list[Any] = []
-    names, states = names_of(result), result["state"].values.tolist()
+    names, points = names_of(result), columns(result, "section_points", (first, second))
     for k, color in enumerate(colors):
-        points = result["section_points"].values[result["point_attractor"].values == k]
-        mark = section_mark(result, k, size)
-        ax.plot(*(points[:, states.index(name)] for name in (first, second)), linestyle="", **mark)
+        here, mark = result["point_attractor"].values == k, section_mark(result, k, size)
+        ax.plot(*(column[here] for column in points), linestyle="", **mark)
         mark["markersize"] = max(mark["markersize"], 0.8 * size)
         handles.append((_box(color), Line2D([], [], linestyle="", **mark)))
         names[k] += f": {100 * float(result['fraction'][k]):.3g} %"
@@ -251,7 +248,6 @@ def basins(ax: Axes, result: xr.Dataset, *, size: Annotated[float, above(0)] = 3
     looks: dict[str, Any] = {"title": "basins, with the section points of their attractors" if colors else None}
     looks |= {"handlelength": 1.4, "handleheight": 1.2, "handler_map": {tuple: HandlerTuple(ndivide=1)}}
     ax.legend(handles, names, bbox_to_anchor=(0.5, 1.0), ncols=min(len(handles), 3), **_ABOVE, **looks)
-    ax.set(**limits)
     name_plane(ax, result, first, second)
 
 
@@ -305,32 +301,27 @@ def basin_fractions(ax: Axes, result: xr.Dataset, *, y: Name | None = None) -> N
     names = told_apart([_along(result, k) for k in range(result.sizes["attractor"])])
     colors = [palette.attractor_color(k) for k in range(len(names))]
     edge: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.3}
+    ax.margins(x=0)
     if y is None:
         shares = [*fraction.T, (result["not_converged"] + result["diverged"]).values]
         if shares[-1].any():
             names, colors = [*names, "none reached"], [*colors, palette.UNKNOWN]
         ax.stackplot(values, *(100 * one for one in shares[: len(names)]), colors=colors, labels=names, **edge)
         ax.set(ylabel="share of starts (%)", ylim=(0, 100))
-    else:
-        for k, (name, color) in enumerate(zip(names, colors, strict=True)):
-            heights = result["maximum"].sel(state=y).values[:, k]
-            good = np.isfinite(heights)
-            ax.plot(values[good], heights[good], ".", color=color, markersize=1.5)
-            ax.scatter(values[good], heights[good], s=_LARGEST**2 * fraction[good, k], color=color, **edge)
-            ax.scatter([], [], s=25, color=color, label=name, **edge)  # of one size in the legend, whatever the share
-    ax.margins(x=0)
-    if y is None:
         name_axes(ax, name_and_unit(result, parameter))
     else:
+        heights = result["maximum"].sel(state=y).values
+        for k, (name, color) in enumerate(zip(names, colors, strict=True)):
+            ax.plot(values, heights[:, k], ".", color=color, markersize=1.5)
+            ax.scatter(values, heights[:, k], s=_LARGEST**2 * fraction[:, k], color=color, **edge)
+            ax.scatter([], [], s=25, color=color, label=name, **edge)  # of one size in the legend, whatever the share
         name_plane(ax, result, parameter, y, "max ")
     above = (0.5, 1.0 if y is None else 1.06)  # the power of ten of the ordinate, too
     ax.legend(bbox_to_anchor=above, ncols=2, handlelength=1.0, handleheight=1.0, **_ABOVE)
 
 
 def _along(result: xr.Dataset, k: int) -> str:
-    """Kinds of an attractor along the parameter, each once, in the order met."""
+    """Kinds of an attractor along the parameter, each once, in the order met; the periods together."""
     kinds = result["name"].values[result["period_number"].values[:, k] >= 0, k]
-    distinct = list(dict.fromkeys(map(str, kinds)))
-    numbers = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
-    words = [f"period {', '.join(numbers)}"] if numbers else []
-    return ", ".join(words + [kind for kind in distinct if not kind.startswith("period")])
+    distinct = sorted(dict.fromkeys(map(str, kinds)), key=lambda kind: not kind.startswith("period"))
+    return ", ".join(distinct).replace(", period", ",")

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, name_axes, only_states, symbol_of
@@ -69,7 +69,7 @@ def regions(
     name_axes(ax, *((symbol_of(name), system.states[name]) for name in names))
 
 
-def _margins(system: System, names: list[str], first: Any, second: Any, t: float) -> NDArray[np.float64]:
+def _margins(system: System, names: list[str], first: Any, second: Any, t: float) -> FloatArray:
     """The signed indicators of the condition that leaves the first mode, in units of eta where smoothed: (R, ...)."""
     sharp = system.smoothed(None).traced
     rows = next((item.rows for item in sharp.transitions if item.source == 0 and item.rows), None)
@@ -84,7 +84,7 @@ def _margins(system: System, names: list[str], first: Any, second: Any, t: float
     return np.asarray((h[:, [row.indicator for row in rows]] * signs).T.reshape(len(rows), *first.shape))
 
 
-def _draw(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64], band: bool) -> None:
+def _draw(ax: Axes, x: Any, y: Any, margins: FloatArray, band: bool) -> None:
     least, tilde = margins.min(axis=0), "" if band else r"\tilde "
     _fill(ax, x, y, least + band, _OUTSIDE, f"${tilde}G_-$")
     _fill(ax, x, y, band - least, _INSIDE, f"${tilde}G_+$")
@@ -103,13 +103,13 @@ def _draw(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64], band: bool) ->
             ax.annotate(name, longest[len(longest) // 2], (5, 2), textcoords="offset points", color=color)
 
 
-def _others(margins: NDArray[np.float64]) -> list[tuple[int, NDArray[np.float64]]]:
+def _others(margins: FloatArray) -> list[tuple[int, FloatArray]]:
     """For each row, the least of the other rows (infinite where there is one row only)."""
     infinite = np.full((1, *margins.shape[1:]), np.inf)
     return [(r, np.concatenate([np.delete(margins, r, axis=0), infinite]).min(axis=0)) for r in range(len(margins))]
 
 
-def _fill(ax: Axes, x: Any, y: Any, outside: NDArray[np.float64], color: str, name: str) -> None:
+def _fill(ax: Axes, x: Any, y: Any, outside: FloatArray, color: str, name: str) -> None:
     """Fill where ``outside`` is negative, and write the name where there is most room."""
     from scipy.ndimage import distance_transform_edt
 

@@ -45,6 +45,13 @@ COLORS = {
 #: A legend above the axes, for pictures that fill theirs.
 ABOVE: Mapping[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
 
+
+def beside(height: float) -> dict[str, Any]:
+    """Place of a legend to the right of the axes, its top at their top (1) or its foot at theirs (0)."""
+    where = "upper left" if height else "lower left"
+    return {"loc": where, "bbox_to_anchor": (1.01, height), "borderaxespad": 0.0}
+
+
 _DOT = 7.0  # of a point cloud in a legend, in points; the mark "." is half of it wide
 
 
@@ -192,14 +199,16 @@ def line(ax: Axes, x: Any, y: Any, *form: str, **looks: Any) -> None:
 
 
 def cloud(ax: Axes, points: Iterable[Any], size: float, color: str, label: str | None = None) -> None:
-    """Draw many points (x, y) as dots without edges; they are pixels in a vector figure."""
-    ax.plot(*map(np.ravel, points), ".", color=color, label=label, markersize=size, markeredgewidth=0, rasterized=True)
+    """Draw many points (x, y), broadcast, as dots without edges; they are pixels in a vector figure."""
+    x, y = map(np.ravel, np.broadcast_arrays(*points))
+    ax.plot(x, y, ".", color=color, label=label, markersize=size, markeredgewidth=0, rasterized=True)
 
 
 def mark(ax: Axes, points: Iterable[Any], marker: str, words: str, size: float = 4.0, **looks: Any) -> None:
-    """Draw white marks at points (x, y), with a dark edge, named in the legend once."""
+    """Draw white marks at points (x, y), broadcast, with a dark edge, named in the legend once."""
     looks = {"markerfacecolor": "white", "markeredgecolor": COLORS["section"], "markeredgewidth": 0.8, **looks}
-    ax.plot(*map(np.ravel, points), marker, linestyle="none", markersize=size, label=once(ax, words), **looks)
+    x, y = map(np.ravel, np.broadcast_arrays(*points))
+    ax.plot(x, y, marker, linestyle="none", markersize=size, label=once(ax, words), **looks)
 
 
 def points(
@@ -281,6 +290,11 @@ def shared_legend(figure: Figure, columns: int = 5) -> Legend:
     return legend
 
 
+def scattered(line: Any) -> bool:
+    """Return whether something drawn is points that no line joins."""
+    return hasattr(line, "get_marker") and line.get_linestyle() == "None"
+
+
 def even_dots(legend: Legend) -> None:
     """Show the dots of point clouds in a legend large enough to be told apart, whatever their size in the figure."""
     from matplotlib.lines import Line2D
@@ -299,10 +313,8 @@ def clear_legend(ax: Axes) -> Legend:
     box = legend.get_window_extent()
     for line in ax.lines:
         path = line.get_path().transformed(line.get_transform())
-        joined = line.get_linestyle() not in ("None", "none", " ", "")
-        if box.count_contains(path.vertices) or (
-            joined and path.cleaned(remove_nans=True).intersects_bbox(box, filled=False)
-        ):
+        crossed = not scattered(line) and path.cleaned(remove_nans=True).intersects_bbox(box, filled=False)
+        if crossed or box.count_contains(path.vertices):
             above = ax.legend(**ABOVE, ncols=2, columnspacing=1.0)
             return ax.legend(**ABOVE) if above.get_window_extent().width > whole.bbox.width else above
     return legend

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.branches import check_axis, draw_branch
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
     Name,
+    by_direction,
     column,
     first_states,
     in_lines,
@@ -80,15 +81,13 @@ def bifurcation(
     else:
         points = quantity_of(result, name, also=result["state"].values.tolist()).expand_dims("iterate")
     size = size if of_state else 3.0 * size
-    directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
-    for i, direction in enumerate(directions):
-        mine = points.isel(direction=i) if "direction" in points.dims else points
-        cloud = mine.transpose(..., parameter).values
-        values = np.broadcast_to(result[parameter].values, cloud.shape)
+    directions = dict(by_direction(result, points))
+    for direction, mine in directions.items():
         under = direction == "up" and "down" in directions
         shade = color or (style.COLORS["pale"] if under else _LOOKS[direction]["color"])
         words = direction if len(directions) > 1 else None
-        style.cloud(ax, (values, cloud), size * (_SEAM if under else 1.0), shade, words)
+        cloud = result[parameter].values, mine.transpose(..., parameter).values
+        style.cloud(ax, cloud, size * (_SEAM if under else 1.0), shade, words)
     for k, one in enumerate(over):
         draw_branch(ax, one, y=name, color=palette.nth(k, _LINES), behind=True)
     _whole(ax, result[parameter].values)
@@ -132,9 +131,8 @@ def bifurcation_diagram(
     """
     (name,) = first_states(result, y)
     parameter = str(result.attrs["parameter"])
-    swept = result["swept_section"].sel(state=name).transpose("direction", "sample", "iterate").values
-    values = np.broadcast_to(result["swept_value"].values[None, :, None], swept.shape)
-    style.cloud(ax, (values, swept), size, style.COLORS["pale"], "sweeps")
+    swept = result["swept_section"].sel(state=name).transpose(..., "sample").values
+    style.cloud(ax, (result["swept_value"].values, swept), size, style.COLORS["pale"], "sweeps")
     for k in range(result.sizes["branch_id"]):
         draw_branch(ax, one_branch(result, k), y=name, special=special)
     _whole(ax, result["swept_value"].values)
@@ -205,8 +203,7 @@ def frequency_response(
     for branch in over:
         check_axis(branch, parameter)
     marks: list[Any] = []
-    for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
-        one = heights.isel(direction=i) if "direction" in heights.dims else heights
+    for direction, one in by_direction(result, heights):
         curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
         for k, curve in enumerate(curves.T):
             found = _intervals(values, curve, _jumps(result, jumping, direction, k))
@@ -228,12 +225,11 @@ def frequency_response(
 def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
     """Shade the cells of an axis in which a condition holds."""
     whole = inside.all([dim for dim in inside.dims if dim != parameter]).sortby(parameter)
-    edges = edges_of(whole[parameter].values)
-    words = in_lines(str(inside.attrs.get("long_name", "region")), _LONGEST)
-    looks: dict[str, Any] = {"color": style.COLORS["third"], "alpha": 0.15, "linewidth": 0, "zorder": 0}
-    for i in np.flatnonzero(whole.values):
-        ax.axvspan(edges[i], edges[i + 1], label=style.once(ax, words), **looks)
-    ax.set_xlim(*whole[parameter].values[[0, -1]])
+    values, there = whole[parameter].values, np.repeat(whole.values, 2)
+    words = in_lines(str(inside.attrs.get("long_name", "region")), _LONGEST) if there.any() else None
+    ends = np.repeat(edges_of(values), 2)[1:-1]
+    style.shade(ax, ends, there, color=style.COLORS["third"], alpha=0.15, zorder=0, label=words)
+    ax.set_xlim(values[0], values[-1])
 
 
 def _jumps(result: xr.Dataset, names: list[str], direction: str, start: int) -> list[float]:
@@ -244,7 +240,7 @@ def _jumps(result: xr.Dataset, names: list[str], direction: str, start: int) -> 
     return np.unique(result["jump_value"].values[mine & (result["jump_start"].values == start)]).tolist()
 
 
-def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: list[float]) -> list[tuple[float, int]]:
+def _intervals(values: FloatArray, curve: FloatArray, places: list[float]) -> list[tuple[float, int]]:
     """Each jump with the i such that it lies between the points i - 1 and i.
 
     A jump may be reported at a point itself, on either side: of the intervals next to it the steepest is meant.
@@ -263,8 +259,8 @@ def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: 
 
 def _mark(
     ax: Axes,
-    values: NDArray[np.float64],
-    curve: NDArray[np.float64],
+    values: FloatArray,
+    curve: FloatArray,
     at: int,
     place: float,
     direction: str,

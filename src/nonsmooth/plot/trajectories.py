@@ -6,14 +6,15 @@ import re
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import unknown
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
     Name,
     column,
+    columns,
     first_states,
     in_lines,
     name_and_unit,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def with_gaps(result: xr.Dataset, *curves: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def with_gaps(result: xr.Dataset, *curves: FloatArray) -> list[FloatArray]:
     """The curves with NaN between the two limits of every crossing at which the state jumped."""
     segment, u = result["segment"].values, result["u"].values
     jump = (np.diff(segment) != 0) & np.any(np.abs(np.diff(u, axis=0)) > 0, axis=1)
@@ -37,7 +38,7 @@ def with_gaps(result: xr.Dataset, *curves: NDArray[np.float64]) -> list[NDArray[
     return [np.insert(curve.astype(float), at, np.nan) for curve in curves]
 
 
-def pieces_by_mode(mode: NDArray[np.integer], *curves: NDArray[np.float64]) -> list[list[NDArray[np.float64]]]:
+def pieces_by_mode(mode: IntArray, *curves: FloatArray) -> list[list[FloatArray]]:
     """For each mode the curves, NaN where another mode rules; entry k belongs to mode k."""
     return [[np.where(mode == k, curve, np.nan) for curve in curves] for k in range(int(mode.max(initial=0)) + 1)]
 
@@ -59,7 +60,7 @@ def time_history(ax: Axes, result: xr.Dataset, *, y: Name | None = None, shade: 
     name_plane(ax, result, "time", name)
 
 
-def _away(result: xr.Dataset, shade: bool | str) -> NDArray[np.bool_]:
+def _away(result: xr.Dataset, shade: bool | str) -> BoolArray:
     """The samples in another mode than the first, with a closed contact, or with an element in another phase."""
     mode = result["mode"]
     words = words_of_flags(mode)
@@ -113,7 +114,7 @@ def phase_portrait(
     """
     names = first_states(result, x, y)
     mode = result["mode"].values.astype(float)
-    cut_mode, *cut = with_gaps(result, mode, *(column(result, "u", name).values for name in names))
+    cut_mode, *cut = with_gaps(result, mode, *columns(result, "u", names))
     modes = words_of_flags(result["mode"])
     for k, (xs, ys) in enumerate(pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)):
         if np.isfinite(xs).any():
@@ -121,9 +122,10 @@ def phase_portrait(
             ax.plot(xs, ys, color=palette.nth(k), label=words, zorder=2 + 0.1 * k)
     if section is not None:
         variable_along(section, "section", "poincare or sweep")
-        points = [column(section, "section", name).values.ravel() for name in names]
-        looks: dict[str, Any] = {"markersize": 2.6, "color": style.COLORS["section"], "zorder": 4}
-        ax.plot(*points, "o", label="section points", rasterized=points[0].size > 500, **looks)
+        x_points, y_points = map(np.ravel, columns(section, "section", names))
+        many, color = x_points.size > 500, style.COLORS["section"]
+        words = "section points"
+        ax.plot(x_points, y_points, "o", label=words, markersize=2.6, color=color, zorder=4, rasterized=many)
     if zone is not None:
         shade_zone(ax, edge_of(result, zone))
     name_plane(ax, result, *names)
@@ -164,8 +166,7 @@ def section(
     ``size`` is the diameter of a point in typographic points. Clouds are pixels in a vector figure.
     """
     names = first_states(result, x, y)
-    points = (column(result, "section", name).values for name in names)
-    style.cloud(ax, points, size, style.COLORS["section"])
+    style.cloud(ax, columns(result, "section", names), size, style.COLORS["section"])
     name_plane(ax, result, *names)
 
 
@@ -194,19 +195,19 @@ def orbit(ax: Axes, result: Any, *, x: Name | None = None, y: Name | None = None
     phase_portrait(run, ax, x=names[0], y=names[1])
     mark: dict[str, Any] = {"size": 3.4, "zorder": 5, "markeredgewidth": 0.7}
     if run.sizes["crossing"]:
-        sides = (np.concatenate([run[key].sel(state=name) for key in ("u_before", "u_after")]) for name in names)
-        style.mark(ax, sides, "o", "crossing", **mark)
+        sides = (columns(run, key, names) for key in ("u_before", "u_after"))
+        style.mark(ax, np.concatenate([*sides], axis=1), "o", "crossing", **mark)
     # Phase 0 of each forcing period; of an autonomous orbit the one state it is held by.
     returns = max(result.period_number, 1)
     time = run["time"].values
     at = [int(np.abs(time - k * result.period / returns).argmin()) for k in range(returns)]
-    points = (run["u"].sel(state=name).values[at] for name in names)
+    points = columns(run.isel(time=at), "u", names)
     style.mark(ax, points, "o", "section", **mark, markerfacecolor=style.COLORS["section"])
     clearance = run["touch_clearance"].values
     if np.isfinite(clearance).any():
         near = int(np.nanargmin(clearance))
         words = f"least clearance {clearance[near]:.2g}"
-        place = [run["touch_u"].sel(state=name).values[near] for name in names]
+        place = columns(run.isel(touch=near), "touch_u", names)
         ax.plot(*place, "x", zorder=6, label=words, color=style.COLORS["fourth"], markersize=5, markeredgewidth=1.1)
     style.clear_legend(ax)
 
@@ -214,7 +215,7 @@ def orbit(ax: Axes, result: Any, *, x: Name | None = None, y: Name | None = None
 _FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
 
 
-def lines_of(result: xr.Dataset, name: str, highest: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def lines_of(result: xr.Dataset, name: str, highest: float) -> tuple[FloatArray, FloatArray, float]:
     """Multiples of the base frequency up to the highest, the amplitudes there, and the least that means something."""
     order, values = result["order"].values, column(result, "amplitude", name).values
     some = (order > 1e-9) & (order <= highest)

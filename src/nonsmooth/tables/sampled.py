@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 from nonsmooth.system.kinds import float_array, real_number, whole_number
@@ -37,7 +37,7 @@ def sampled(run: xr.Dataset, step: float | None, samples: Any) -> xr.Dataset:
     return again
 
 
-def _instants(time: NDArray[np.float64], step: float | None, samples: Any) -> NDArray[np.float64]:
+def _instants(time: FloatArray, step: float | None, samples: Any) -> FloatArray:
     if step is not None and samples is not None:
         raise ValueError("give the instants once: step=... or samples=...")
     first, last = float(time[0]), float(time[-1])
@@ -60,7 +60,7 @@ def _instants(time: NDArray[np.float64], step: float | None, samples: Any) -> ND
     return instants
 
 
-def _anew(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset | None:
+def _anew(run: xr.Dataset, instants: FloatArray) -> xr.Dataset | None:
     """The same motion at the instants; None where the record does not give it."""
     record = read_provenance(run) if ATTRIBUTE in run.attrs else {}
     options = record.get("options") or {}
@@ -81,7 +81,7 @@ def _anew(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset | None:
     return again.isel(time=rows)
 
 
-def _interpolated(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset:
+def _interpolated(run: xr.Dataset, instants: FloatArray) -> xr.Dataset:
     from scipy.interpolate import CubicSpline
 
     time, segment = run["time"].values, run["segment"].values

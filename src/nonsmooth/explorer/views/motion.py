@@ -191,7 +191,7 @@ class Mechanism(View):
     name = "mechanism"
 
     def requests(self, base: Requests) -> Requests:
-        """Pictures, once the orbit is there."""
+        """Pictures, multipliers or exponents, once the orbit is there."""
         return {} if "motion" not in base or self.system.is_map else self.each(base["motion"])
 
     def redraw(self) -> None:
@@ -208,10 +208,7 @@ class Readout(View):
     """A motion in a few words and numbers, with what is known of its stability."""
 
     name = "readout"
-
-    def requests(self, base: Requests) -> Requests:
-        """Multipliers or exponents, once the orbit is there."""
-        return {} if "motion" not in base or self.system.is_map else self.each(base["motion"])
+    requests = Mechanism.requests
 
     def redraw(self) -> None:
         """Tell the period number, section points, contacts, extremes, and the largest multiplier or exponent."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from bokeh.models import CustomJSHover, LinearColorMapper
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.figures import Panel, cells_of
 from nonsmooth.explorer.labels import PREFIXES, power_of
@@ -19,8 +20,6 @@ from nonsmooth.plot.planes import classes_of, legend_of, names_of
 from nonsmooth.plot.style import COLORS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from nonsmooth.explorer.state import PageState
 
 _NOTHING = -1e300  # Bokeh writes NaN itself, and asks no formatter
@@ -62,12 +61,12 @@ class CellImage(View):
 
     def put(
         self,
-        x: NDArray[np.float64],
-        y: NDArray[np.float64],
-        classes: NDArray[Any],
+        x: FloatArray,
+        y: FloatArray,
+        classes: Any,
         entries: Sequence[tuple[str, str]],
         stage: str,
-        more: NDArray[np.float64] | None = None,
+        more: FloatArray | None = None,
         unit: str = "1",
     ) -> None:
         """Draw classes (y, x), numbers of ``entries`` (words, colour); ``more`` are exponents in a unit."""
