@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import os
 import threading
-import time
 import uuid
-from collections.abc import Callable, Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from queue import SimpleQueue
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.work import ChunkedWork, check_room, clock, empty_columns, places_of
+from nonsmooth.campaign.work import ChunkedWork, Columns, check_room, empty_columns, places_of
 from nonsmooth.errors import Interrupted, not_installed, shortened
 from nonsmooth.flow.engines.engine import obey
 from nonsmooth.kernels.hybrid import codes
@@ -75,7 +76,7 @@ def run(
     before = size - sum(last - first for first, last in map(work.bounds, missing))
     with progress_bar(size, label, progress, before) as advance:
 
-        def keep(chunk: int, arrays: Mapping[str, NDArray[Any]] | None) -> None:
+        def keep(chunk: int, arrays: Columns | None) -> None:
             first, last = work.bounds(chunk)
             if keeper is None and arrays is not None:
                 for name, values in arrays.items():
@@ -87,7 +88,7 @@ def run(
         else:
             if missing:
                 work.load()
-            over_items(missing, (_Kept(work, keeper) if keeper else work).compute, keep, threads)
+            over_items(missing, work.compute if keeper is None else partial(keeper.compute, work), keep, threads)
     return columns if keeper is None else keeper.read(work)
 
 
@@ -106,23 +107,6 @@ def whole_or_part(
         if part is None:
             raise
         raise Interrupted.with_points(error, int(done.sum()), done.size, label, part) from error
-
-
-class _Kept:
-    """A work whose chunks go into a store as soon as they are computed, in the thread that computed them."""
-
-    def __init__(self, work: ChunkedWork, keeper: Any) -> None:
-        self.work, self.keeper, self.device = work, keeper, work.device
-        self.columns, self.n_chunks, self.bounds = work.columns, work.n_chunks, work.bounds
-        self.describe, self.load = work.describe, work.load
-
-    def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]:
-        self.keeper.note_start(chunk)
-        now = clock(self.device)
-        began = now()
-        arrays = self.work.compute(chunk)
-        self.keeper.write(self.work, chunk, arrays, now() - began)
-        return arrays
 
 
 T = TypeVar("T")
@@ -212,25 +196,22 @@ def connect(address: str) -> Any:
         ) from error
 
 
-def compute_chunk(work: ChunkedWork, chunk: int, path: str | None, key: str) -> Mapping[str, NDArray[Any]] | None:
+def compute_chunk(work: ChunkedWork, chunk: int, path: str | None, key: str) -> Columns | None:
     """Compute one chunk on a worker, into the store where there is one."""
     if path is None:
         return work.compute(chunk)
     from nonsmooth.campaign.store import ChunkStore
 
     store = ChunkStore(Path(path), key)
-    if store.has(chunk):  # computed meanwhile for a client that is gone
-        return None
-    store.note_start(chunk)
-    began = time.thread_time()  # of a processor: other users of the machine do not lengthen it
-    store.write(work, chunk, work.compute(chunk), time.thread_time() - began)
+    if not store.has(chunk):  # else computed meanwhile for a client that is gone
+        store.compute(work, chunk)
     return None
 
 
 def on_cluster(
     work: ChunkedWork,
     chunks: Iterable[int],
-    done: Callable[[int, Mapping[str, NDArray[Any]] | None], None],
+    done: Callable[[int, Columns | None], None],
     client: Any,
     store: ChunkStore | None,
 ) -> None:
@@ -257,20 +238,21 @@ def on_cluster(
     path, key = (None, "") if store is None else (str(store.path.resolve()), store.key)
     family = uuid.uuid4().hex[:16]  # never the names of a client that is gone: its tasks may be half forgotten
     order = iter(chunks)
-    attempts: dict[int, int] = {}
+    attempts: Counter[int] = Counter()
+    pending: dict[Any, int] = {}
+    queue = as_completed([], loop=client.loop)  # without it: that of the default client
 
-    def send(chunk: int) -> Any:
-        attempts[chunk] = attempts.get(chunk, 0) + 1
-        name = f"nonsmooth-{family}-{chunk}" + (f"-{attempts[chunk]}" if attempts[chunk] > 1 else "")
-        return client.submit(compute_chunk, work, chunk, path, key, key=name, pure=False)
+    def send(chunk: int) -> None:
+        attempts[chunk] += 1
+        name = f"nonsmooth-{family}-{chunk}-{attempts[chunk]}"
+        future = client.submit(compute_chunk, work, chunk, path, key, key=name, pure=False)
+        pending[future] = chunk
+        queue.add(future)
 
     address = client.scheduler.address
-    threads = max(sum(client.nthreads().values()), 1)
-    pending = {send(chunk): chunk for chunk in islice(order, AHEAD * threads)}
-    if not pending:
-        return
-    queue = as_completed(list(pending), loop=client.loop)  # without it: that of the default client
     try:
+        for chunk in islice(order, AHEAD * max(sum(client.nthreads().values()), 1)):
+            send(chunk)
         for future in queue:
             chunk = pending.pop(future)
             try:
@@ -279,9 +261,7 @@ def on_cluster(
             except KilledWorker:
                 if attempts[chunk] >= ATTEMPTS:
                     raise
-                again = send(chunk)
-                pending[again] = chunk
-                queue.add(again)
+                send(chunk)
                 continue
             except FutureCancelledError as error:
                 kept = "finished chunks are in the store: " if store is not None else ""
@@ -292,9 +272,7 @@ def on_cluster(
             done(chunk, arrays)
             future.release()
             for following in islice(order, 1):
-                new = send(following)
-                pending[new] = following
-                queue.add(new)
+                send(following)
     except BaseException:
         client.cancel(list(pending))
         raise

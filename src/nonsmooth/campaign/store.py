@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.work import ChunkedWork, described, difference, processor_type
+from nonsmooth.campaign.work import ChunkedWork, Columns, clock, described, difference, places_of, processor_type
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.store import needs_zarr
 from nonsmooth.results.whole import beside, digest, seal, sealed, told, write_whole
@@ -70,7 +70,15 @@ class ChunkStore:
         with told(self.path, KEPT), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
             log.write(line + "\n")
 
-    def write(self, work: ChunkedWork, chunk: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
+    def compute(self, work: ChunkedWork, chunk: int) -> None:
+        """Compute a chunk and keep it, in the thread that calls."""
+        self.note_start(chunk)
+        now = clock(work.device)
+        began = now()
+        arrays = work.compute(chunk)
+        self.write(work, chunk, arrays, now() - began)
+
+    def write(self, work: ChunkedWork, chunk: int, arrays: Columns, seconds: float) -> None:
         """Keep a chunk: its arrays first, then the mark that it is done.
 
         Raises
@@ -208,7 +216,7 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     return record
 
 
-def stored_bytes(work: ChunkedWork, samples: Sequence[Mapping[str, NDArray[Any]]], kept: int) -> int:
+def stored_bytes(work: ChunkedWork, samples: Sequence[Columns], kept: int) -> int:
     """Bytes that a store of the whole work takes, by what a sample of its places takes in a store in memory.
 
     ``kept``: places of a chunk of the store.
@@ -222,7 +230,7 @@ def stored_bytes(work: ChunkedWork, samples: Sequence[Mapping[str, NDArray[Any]]
     there = len(next(iter(columns.values())))
     _create(group, work, there, min(kept, there))
     _put(group, columns, 0, there)
-    places = work.bounds(work.n_chunks() - 1)[1]
+    places = places_of(work)
     heads = sum(len(data) for name, data in taken.items() if name.endswith("zarr.json"))
     heads += len(json.dumps(json.dumps(described(work))))
     chunks = sum(len(data) for name, data in taken.items() if not name.endswith("zarr.json"))
@@ -258,7 +266,7 @@ def _create(group: Any, work: ChunkedWork, places: int, chunk: int) -> None:
         group.create_array(name, shape=shape, chunks=chunks, dtype=item.dtype, compressors=compressors)
 
 
-def _put(group: Any, arrays: Mapping[str, NDArray[Any]], first: int, last: int) -> None:
+def _put(group: Any, arrays: Columns, first: int, last: int) -> None:
     """Write places of each column, zeros too.
 
     That zeros are written is a setting of an opened array, not of the file. It is set for each array: the library's
@@ -285,7 +293,7 @@ def _results(path: Path, mode: Any) -> Any:
 
 def _check_columns(path: Path, group: Any, work: ChunkedWork) -> None:
     """Refuse columns whose description was altered: their type and shape follow from the work."""
-    places = work.bounds(work.n_chunks() - 1)[1]
+    places = places_of(work)
     for name, item in work.columns().items():
         try:
             array = group[name]
@@ -306,7 +314,7 @@ def _whole(group: Any, work: ChunkedWork) -> dict[str, NDArray[Any]]:
         return {}
 
 
-def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
+def _content(arrays: Columns) -> str:
     found = hashlib.sha256()
     for name in sorted(arrays):
         found.update(f"{name} {arrays[name].dtype.str} {arrays[name].shape} ".encode())

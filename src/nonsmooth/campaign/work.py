@@ -25,6 +25,9 @@ STORED = 4096  # and of one that is kept in a store or sent to a cluster: a seco
 LISTED = 40  # bytes of a chunk's number in a list
 
 
+Columns = Mapping[str, NDArray[Any]]  # arrays over places, by name
+
+
 @dataclass(frozen=True)
 class ColumnType:
     """One result per place: its type, the shape of one entry, and what stands where nothing was computed (NaN of real
@@ -54,7 +57,7 @@ class ChunkedWork(Protocol):
 
     def load(self) -> None: ...
 
-    def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]: ...
+    def compute(self, chunk: int) -> Columns: ...
 
     def describe(self) -> Mapping[str, Any]: ...
 

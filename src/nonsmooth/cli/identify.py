@@ -49,8 +49,7 @@ def run(options: argparse.Namespace) -> int:
     rig = package("savi2007", "identification")
     study = _read(options.study)
     crank = study.get("crank_length") if options.crank is None else options.crank
-    how = {"apparatus": study.get("apparatus", {}), "crank_length": crank}
-    found = rig.identify(study["session"], study.get("model"), **how)
+    found = rig.identify(study["session"], study.get("model"), apparatus=study.get("apparatus", {}), crank_length=crank)
     rig.require(found, study.get("parameters", []))
     print(found)
     if not options.quiet:

@@ -48,11 +48,12 @@ def run(options: argparse.Namespace) -> int:
     from nonsmooth.studies import installed, study
 
     out = options.out or Path("out") / (options.study + "_quick" * options.quick)
-    asked = {"figures": options.figure, "quick": options.quick, "full": options.full, "progress": not options.quiet}
     # what follows loads the numerics: that takes a second or more
     if options.study in installed() and not options.quiet and sys.stderr.isatty():
         print(f"reproducing {options.study} into {out}", file=sys.stderr, flush=True)
     without_screen()
-    study(options.study).reproduce(out=out, **asked)
+    study(options.study).reproduce(
+        out=out, figures=options.figure, quick=options.quick, full=options.full, progress=not options.quiet
+    )
     print(f"written to {out}", file=sys.stderr)
     return 0

@@ -61,77 +61,63 @@ def branch_dataset(
 
     other = names.amplitude if parameter == names.frequency else names.frequency
     held = [point.held for point in points]
-    omega = np.array([one.frequency for one in held])
-    level = np.array([one.amplitude for one in held])
+    omega, level = np.array([(one.frequency, one.amplitude) for one in held]).reshape(-1, 2).T
     along, fixed = (omega, level) if parameter == names.frequency else (level, omega)
-    rows = [_motion(one.position.seen, one.frequency) for one in held]
-    section, maximum, minimum = (np.array([row[i] for row in rows]).reshape(-1, 2) for i in range(3))
+    rows = np.array([_motion(one.position.seen, one.frequency) for one in held]).reshape(-1, 3, 2)
+    section, maximum, minimum = rows.transpose(1, 0, 2)
     uncertainty, across = np.array([_uncertainties(march, point) for point in points]).reshape(-1, 2).T
     size = 0.5 * (maximum - minimum)[:, 0]
     uncertainty = np.maximum(uncertainty, _beside_folds(size, along, across))
-    unit = names.unit(names.position)
-    force = names.unit("force")
-    kind = np.array([one[0] for one in released], dtype=np.int8)
-    folds = _folds(march, points, along, across)
-    attrs = attribute(record) | {"parameter": parameter}
-
-    def over(values: Any, words: str, units: str = "1", **more: Any) -> tuple[str, Any, dict[str, Any]]:
-        return "point", np.asarray(values), {"long_name": words, "units": units, **more}
-
-    variables: dict[str, Any] = {
-        "section": labelled(("point", "state"), section, "state at phase 0 of the drive"),
-        "maximum": labelled(("point", "state"), maximum, "largest value along the orbit"),
-        "minimum": labelled(("point", "state"), minimum, "smallest value along the orbit"),
-        "amplitude": over(size, "half the peak-to-peak value", unit),
-        "amplitude_uncertainty": over(uncertainty, "standard uncertainty of the amplitude at this parameter", unit),
-        "parameter_uncertainty": over(
-            across, "standard uncertainty of the parameter at this amplitude", names.unit(parameter)
-        ),
-        "period": over(2 * np.pi / omega, "period of the drive", "s"),
-        "stability": over(
-            kind,
-            "motion that was let go: came back, left, or not known",
-            **flag_attributes(["not_known", "unstable", "stable"], [UNKNOWN, UNSTABLE, STABLE]),
-        ),
-        "growth": over([one[1] for one in released], "mean factor by which the distance changed per turn when let go"),
-        "control_effort": over([p.held.effort for p in points], "rms of the control force that repeats", force),
-        "control_effort_noise": over([p.held.effort_noise for p in points], "the same of noise alone", force),
-        "control_effort_first": over([p.first_effort for p in points], "the same before the first correction", force),
-        "control_rms": over([p.held.force_rms for p in points], "rms of the whole control force", force),
-        "measurements": over([p.measurements for p in points], "measurements until the control force vanished"),
-        "position_cosine": labelled(
-            ("point", "harmonic"),
-            np.array([p.held.position.c.real for p in points]),
-            "cosine coefficients of the motion",
-            unit,
-        ),
-        "position_sine": labelled(
-            ("point", "harmonic"),
-            np.array([-p.held.position.c.imag for p in points]),
-            "sine coefficients of the motion",
-            unit,
-        ),
-        "special_kind": labelled("special", strings(["fold"] * len(folds)), "kind of the special point"),
-        "special_point": labelled(
-            "special", np.array([one[2] for one in folds], dtype=np.int64), "nearest of the points"
-        ),
-        "special_value": labelled(
-            "special", np.array([one[0] for one in folds]), f"{parameter} at the special point", names.unit(parameter)
-        ),
-        "special_value_uncertainty": labelled(
-            "special", np.array([one[1] for one in folds]), "its standard uncertainty", names.unit(parameter)
-        ),
-        "turns": labelled((), np.int64(march.holder.turns), "turns of the drive in all"),
-        "ended_because": labelled((), ENDINGS.get(ending, ending), "how the branch ends"),
+    unit, own, force = names.unit(names.position), names.unit(parameter), names.unit("force")
+    kinds, growths = np.array(released).reshape(-1, 2).T
+    harmonics = march.holder.harmonics + 1
+    c = np.array([one.position.c for one in held]).reshape(-1, harmonics)
+    places, spreads, nearest = np.array(_folds(march, points, along, across)).reshape(-1, 3).T
+    tables: dict[Any, dict[str, tuple[Any, ...]]] = {
+        ("point", "state"): {
+            "section": (section, "state at phase 0 of the drive"),
+            "maximum": (maximum, "largest value along the orbit"),
+            "minimum": (minimum, "smallest value along the orbit"),
+        },
+        "point": {
+            "amplitude": (size, "half the peak-to-peak value", unit),
+            "amplitude_uncertainty": (uncertainty, "standard uncertainty of the amplitude at this parameter", unit),
+            "parameter_uncertainty": (across, "standard uncertainty of the parameter at this amplitude", own),
+            "period": (2 * np.pi / omega, "period of the drive", "s"),
+            "stability": (kinds.astype(np.int8), "motion that was let go: came back, left, or not known", "1"),
+            "growth": (growths, "mean factor by which the distance changed per turn when let go", "1"),
+            "control_effort": ([one.effort for one in held], "rms of the control force that repeats", force),
+            "control_effort_noise": ([one.effort_noise for one in held], "the same of noise alone", force),
+            "control_effort_first": ([p.first_effort for p in points], "the same before the first correction", force),
+            "control_rms": ([one.force_rms for one in held], "rms of the whole control force", force),
+            "measurements": ([p.measurements for p in points], "measurements until the control force vanished", "1"),
+            parameter: (along, parameter, own),
+        },
+        ("point", "harmonic"): {
+            "position_cosine": (c.real, "cosine coefficients of the motion", unit),
+            "position_sine": (-c.imag, "sine coefficients of the motion", unit),
+        },
+        "special": {
+            "special_kind": (strings(["fold"] * len(places)), "kind of the special point"),
+            "special_point": (nearest.astype(np.int64), "nearest of the points"),
+            "special_value": (places, f"{parameter} at the special point", own),
+            "special_value_uncertainty": (spreads, "its standard uncertainty", own),
+        },
+        "state": {
+            "state": (strings([names.position, names.velocity]), "state"),
+            "state_unit": (strings([unit, names.unit(names.velocity)]), "unit"),
+        },
+        "harmonic": {"harmonic": (np.arange(harmonics), "harmonic of the drive")},
+        (): {
+            "turns": (np.int64(march.holder.turns), "turns of the drive in all"),
+            "ended_because": (ENDINGS.get(ending, ending), "how the branch ends"),
+            other: (float(np.mean(fixed)), other, names.unit(other)),
+        },
     }
-    coords: dict[str, Any] = {
-        parameter: over(along, parameter, names.unit(parameter)),
-        other: labelled((), float(np.mean(fixed)), other, names.unit(other)),
-        "state": labelled("state", strings([names.position, names.velocity]), "state"),
-        "state_unit": labelled("state", strings([unit, names.unit(names.velocity)]), "unit"),
-        "harmonic": labelled("harmonic", np.arange(march.holder.harmonics + 1), "harmonic of the drive"),
-    }
-    return xr.Dataset(variables, coords, attrs)
+    found = {name: labelled(dims, *row) for dims, rows in tables.items() for name, row in rows.items()}
+    found["stability"][2].update(flag_attributes(["not_known", "unstable", "stable"], [UNKNOWN, UNSTABLE, STABLE]))
+    coords = parameter, other, "state_unit"
+    return xr.Dataset(found, attrs=attribute(record) | {"parameter": parameter}).set_coords(coords)
 
 
 def _motion(c: Any, frequency: float) -> tuple[FloatArray, FloatArray, FloatArray]:

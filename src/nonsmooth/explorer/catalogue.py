@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 from nonsmooth import models
@@ -28,10 +28,15 @@ def presets_of(model: str) -> Mapping[str, PageState]:
     base = first_state(model, getattr(models, model)())  # whatever the page shows now
     found = {}
     for name, given in views.items():
-        values = {key: value for key, value in given.items() if key in base.values}
-        rest = {key: value for key, value in given.items() if key not in base.values}
-        found[name] = replace(base, values={**base.values, **values}, **rest)
+        values = {key: given.get(key, value) for key, value in base.values.items()}
+        found[name] = replace(base, values=values, **{key: given[key] for key in given.keys() - values.keys()})
     return found
+
+
+@lru_cache(maxsize=64)
+def text_of(system: System) -> str:
+    """The system's text, as the worker takes it."""
+    return system.to_text()
 
 
 def first_state(model: str, system: System) -> PageState:
@@ -40,8 +45,8 @@ def first_state(model: str, system: System) -> PageState:
     values = {name: float(system.values[name]) for name in names}
     over = next((name for name in USUAL if name in values), names[0])
     value = values[over]
-    around = (value - 0.4 * abs(value), value + 0.4 * abs(value)) if value else (-1.0, 1.0)
-    low, high = (0.2, 0.5) if model == PAPER else around
+    half = 0.4 * abs(value) or 1.0
+    low, high = (0.2, 0.5) if model == PAPER else (value - half, value + half)
     # the second axis of the phase plane: the velocity of the first state where its name says so
     likely = (f"v_{states[0]}", states[0].replace("x", "v", 1), "v", *states[1:], states[0])
     y = next(name for name in likely if name in (states[1:] or states))
@@ -83,9 +88,7 @@ class Catalogue:
     """
 
     def __init__(self, makers: Mapping[str, Callable[[], System]]) -> None:
-        self._makers = dict(makers)
-        self._systems: dict[str, System] = {}
-        self._texts: dict[str, str] = {}
+        self._makers: dict[str, Callable[[], System]] = {name: cache(maker) for name, maker in makers.items()}
 
     @classmethod
     def of(cls, system: System | None) -> Catalogue:
@@ -108,15 +111,7 @@ class Catalogue:
         """The system at its own parameters; ValueError where no model has this name."""
         if name not in self._makers:
             raise ValueError(f"{str(name)[:60]!r} is no model of this page; there are: {', '.join(self)}")
-        if name not in self._systems:
-            self._systems[name] = self._makers[name]()
-        return self._systems[name]
-
-    def text(self, name: str) -> str:
-        """The system's text, as the worker takes it."""
-        if name not in self._texts:
-            self._texts[name] = self.system(name).to_text()
-        return self._texts[name]
+        return self._makers[name]()
 
     def first_state(self, name: str) -> PageState:
         """The first view of a model."""

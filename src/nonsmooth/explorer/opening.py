@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,21 +23,18 @@ def opened_study(system: System, options: Mapping[str, Any], output: Mapping[str
     name, states = _name_of(system), list(system.states)
     state = first_state(name, system)
     for parameter, values in _ranges(options):
-        ends = [float(end) for end in (np.min(values), np.max(values))] if np.size(values) > 1 else []
-        if parameter in state.values and ends and ends[0] < ends[1]:
-            state = state.but("over", parameter).but("low", ends[0]).but("high", ends[1])
+        low, high = float(np.min(values, initial=np.inf)), float(np.max(values, initial=-np.inf))
+        if parameter in state.values and low < high:
+            state = replace(state, over=parameter, low=low, high=high)
             break
     section, start = options.get("section"), options.get("start")
     if isinstance(start, Mapping):
         start = [start.get(one, 0.0) for one in states] if set(start) <= set(states) else None
-    found: dict[str, Any] = {
+    found: dict[str, Any] = {field: options.get(field) for field in ("direction", "method")} | {"start": start}
+    found |= {
         field: within(field, options[field]) for field in ("transient", "keep") if isinstance(options.get(field), int)
     }
-    found |= {field: options.get(field) for field in ("direction", "method")}
-    found |= {
-        "start": start,
-        "phase": section.get("phase") if isinstance(section, Mapping) else getattr(section, "phase", None),
-    }
+    found["phase"] = section.get("phase") if isinstance(section, Mapping) else getattr(section, "phase", None)
     plane = {"x", "y"} <= output.keys()
     found |= {field if plane else "shown": chosen for field, chosen in output.items() if field in ("x", "y")}
     for field, value in found.items():

@@ -18,7 +18,7 @@ from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
 from nonsmooth.explorer.building import KINDS, LINK, Workshop
-from nonsmooth.explorer.catalogue import Catalogue, presets_of, slider_range
+from nonsmooth.explorer.catalogue import Catalogue, presets_of, slider_range, text_of
 from nonsmooth.explorer.export import KINDS as FILES
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import theme
@@ -100,7 +100,7 @@ class Page:
     @property
     def text(self) -> str:
         """The system's text, as the worker takes it."""
-        return self.catalogue.text(self.state.model)
+        return text_of(self.system)
 
     def _first(self, query: str) -> PageState:
         context = self.document.session_context

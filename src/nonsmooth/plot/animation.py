@@ -15,7 +15,7 @@ import numpy as np
 
 from nonsmooth.errors import Answering, DataFileError
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
+from nonsmooth.plot.labels import columns, first_states, name_plane, variable_along
 from nonsmooth.plot.mechanism import sketch_of_run
 from nonsmooth.plot.pen import put
 from nonsmooth.plot.trajectories import with_gaps
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _COLORS = 48  # of a palette: lines and letters need few
 _TRAIL = 0.2  # of the run: the length of the bright end of an orbit
+_PLOTS = ((0, 1), (3, 2))  # abscissa and ordinate of each: two of the plane, the history over time
 
 
 @checked
@@ -101,9 +102,9 @@ class Animation(Answering):
         from matplotlib.figure import Figure
 
         self.rate, self._run, self._sketch = rate, run, sketch
-        self._made: list[Any] = []
-        self._time, self._at = at["time"].values, [column(at, "u", name).values for name in names]
-        self._drawn, self._curves = run["time"].values, [column(run, "u", name).values for name in names]
+        self._made, self._ends, self._dots = list[Any](), list[Any](), list[Any]()
+        self._curves, self._at = ([*columns(one, "u", names), one["time"].values] for one in (run, at))
+        self._time, self._drawn = self._at[-1], self._curves[-1]
         width, plots, high = 6.0, 2.1, 0.0
         if sketch is not None:
             paper = sketch[0]
@@ -111,26 +112,20 @@ class Animation(Answering):
         with style.journal():
             self.figure = Figure(figsize=(width, plots + high + 0.1), dpi=pixels / width)
             FigureCanvasAgg(self.figure)
-            rows: dict[str, Any] = {"nrows": 1 + bool(high), "height_ratios": [high, plots][not high :]}
-            margins: dict[str, Any] = {"left": 0.1, "right": 0.98, "bottom": 0.42 / (plots + high), "top": 0.98}
-            grid = self.figure.add_gridspec(
-                **rows, ncols=2, width_ratios=[1.0, 1.5], hspace=0.1, wspace=0.24, **margins
-            )
+            sizes: dict[str, Any] = {"height_ratios": [high, plots][not high :], "width_ratios": [1.0, 1.5]}
+            grid = self.figure.add_gridspec(1 + bool(high), 2, hspace=0.1, wspace=0.24, **sizes)
+            grid.update(left=0.1, right=0.98, bottom=0.42 / (plots + high), top=0.98)
             plane, over = (self.figure.add_subplot(grid[-1, k]) for k in (0, 1))
             if sketch is not None:
                 self._paper = self.figure.add_subplot(grid[0, :])
                 paper.frame(self._paper, room=max(0.0, 0.5 * (4.2 - paper.width)))
-            pale: dict[str, Any] = {"color": style.COLORS["pale"], "linewidth": 0.8}
-            end: dict[str, Any] = {"color": style.COLORS["first"], "linewidth": 1.3}
-            dot: dict[str, Any] = {"color": style.COLORS["second"], "markersize": 5}
-            x, y, height = self._curves
-            plane.plot(*with_gaps(run, x, y), **pale)
-            name_plane(plane, run, names[0], names[1])
-            over.plot(*with_gaps(run, self._drawn, height), **pale)
-            over.set_xlim(*self._drawn[[0, -1]])
-            name_plane(over, run, "time", names[2])
-            self._ends = [ax.plot([], [], **end)[0] for ax in (plane, over)]
-            self._dots = [ax.plot([], [], "o", **dot)[0] for ax in (plane, over)]
+            over.set_xlim(self._drawn[0], self._drawn[-1])
+            whole, titles = with_gaps(run, *self._curves), [*names, "time"]
+            for ax, (x, y) in zip((plane, over), _PLOTS, strict=True):
+                ax.plot(whole[x], whole[y], color=style.COLORS["pale"], linewidth=0.8)
+                name_plane(ax, run, titles[x], titles[y])
+                self._ends += ax.plot([], [], color=style.COLORS["first"], linewidth=1.3)
+                self._dots += ax.plot([], [], "o", color=style.COLORS["second"], markersize=5)
 
     def __len__(self) -> int:
         """Number of pictures."""
@@ -144,14 +139,10 @@ class Animation(Answering):
                 self._made = put(self._paper, self._sketch[1](k))
             now, whole = self._time[k], self._drawn[-1] - self._drawn[0]
             rows = slice(*np.searchsorted(self._drawn, [now - _TRAIL * whole, now], side="right"))
-            part = self._run.isel(time=rows)
-            xs, ys, heights, times = with_gaps(part, *(one[rows] for one in (*self._curves, self._drawn)))
-            x, y, height = (one[k] for one in self._at)
-            for line, dot, trail, place in zip(
-                self._ends, self._dots, ((xs, ys), (times, heights)), ((x, y), (now, height)), strict=True
-            ):
-                line.set_data(*trail)
-                dot.set_data(*np.atleast_2d(place).T)
+            trails = with_gaps(self._run.isel(time=rows), *(one[rows] for one in self._curves))
+            for line, dot, (x, y) in zip(self._ends, self._dots, _PLOTS, strict=True):
+                line.set_data(trails[x], trails[y])
+                dot.set_data([self._at[x][k]], [self._at[y][k]])
 
     def _wipe(self) -> None:
         """Take what moves out of the sketch."""

@@ -379,8 +379,9 @@ def controlled_branch(
                 style.points(ax, values[here], heights, yerr=bars, color=color, face=face, size=3.5, label=words)
         if result.sizes["special"]:
             heights, bars = amplitude[result["special_point"].values], 2 * result["special_value_uncertainty"].values
-            looks = {"color": style.COLORS["second"], "face": "none", "mark": "D", "label": "fold"}
-            style.points(ax, result["special_value"].values, heights, xerr=bars, size=6.5, zorder=5, **looks)
+            at, color = result["special_value"].values, style.COLORS["second"]
+            looks: dict[str, Any] = {"mark": "D", "face": "none", "size": 6.5, "label": "fold", "zorder": 5}
+            style.points(ax, at, heights, xerr=bars, color=color, **looks)
         name_plane(ax, result, parameter, state, "amplitude of ")
     ax.legend()
 

@@ -148,8 +148,9 @@ def _contours(ax: Axes, heights: xr.DataArray, levels: Any, name: str) -> None:
     y, x = (heights[dim].values for dim in heights.dims)
     if min(heights.shape) < 2:
         raise ValueError(f"contours of {name} take two values and more of each parameter, not {dict(heights.sizes)}")
-    looks: dict[str, Any] = {"colors": style.COLORS["section"], "linestyles": "--", "linewidths": 0.8}
-    found = ax.contour(x, y, heights.values.astype(float), levels, **looks)
+    found = ax.contour(
+        x, y, heights.values.astype(float), levels, colors=style.COLORS["section"], linestyles="--", linewidths=0.8
+    )
     found.set_path_effects(style.halo())
     power = power_for(unit, float(np.abs(levels).max()))
     words = {at: f"{at / 10.0**power:g} {PREFIXES[power]}{unit.removesuffix('1')}".strip() for at in found.levels}

@@ -9,13 +9,13 @@ is friction.
 
 from __future__ import annotations
 
-import ast
 import re
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
 from nonsmooth.plot.parts import GROUND, Link, Scheme
+from nonsmooth.system.derived.expressions import SPEED
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -49,9 +49,10 @@ class _SchemeReader:
         self.acceleration = [first[j] for _, j in pairs]
         self.speeds = [j for _, j in pairs]
         self.still = {one: 0 for one in self.u if one not in driven}
-        self.values = dict(zip(self.p, (system.values[name] for name in t.parameter_names), strict=True))
+        self.p_of = dict(zip(t.parameter_names, self.p, strict=True))
+        self.values = {self.p_of[name]: system.values[name] for name in self.p_of}
         self.latex = {name: one.symbol or latex_name(name) for name, one in system.parameters.items()}
-        named = dict(zip(self.p, map(self.latex.get, t.parameter_names), strict=True))
+        named = {self.p_of[name]: self.latex[name] for name in self.p_of}
         inputs = {one: latex_name(name) for one, name in zip(self.u, names, strict=True) if one in driven}
         self.symbols = {**named, **inputs, self.t: "t"}
 
@@ -177,7 +178,6 @@ class _SchemeReader:
     # Elements
 
     def _element(self, scheme: Scheme, load: Any) -> None:
-        given = _keywords(load.text)
         speed = load.element.kinematics == "speed"
         place = self._place(load.where, self.v if speed else self.q)
         if place is None:
@@ -187,22 +187,22 @@ class _SchemeReader:
             return
         weights, rest = place
         left, right = self._ends(weights)
-        law = {key: self._law(node) for key, node in given.items()}
+        named = {key: self.p_of.get(load.options.get(key)) for key in load.element.laws}
+        laws = {key: e for key, e in {**named, **load.laws}.items() if e is not None}
+        law = {key: "f(v)" if sp.sympify(e).has(SPEED) else self.text(e) for key, e in laws.items()}
         match load.kind:
             case "Stop" | "ElasticStop":
                 kind, key = ("stop", "restitution") if load.kind == "Stop" else ("elastic", "stiffness")
-                label = law.get(key, "")
-                label = f"e = {label}" if kind == "stop" and label[:1].isdigit() else label
-                scheme.links.append(self._contact(kind, weights, rest, label, "damping" in given))
+                label = f"e = {law[key]}" if kind == "stop" and law[key][:1].isdigit() else law[key]
+                scheme.links.append(self._contact(kind, weights, rest, label, laws.get("damping", 0) != 0))
             case "Coulomb":
                 words = "" if self.is_zero(rest) else self.text(-rest)
-                scheme.links.append(Link("friction", left, right, law.get("friction", ""), words=words))
+                scheme.links.append(Link("friction", left, right, law["friction"], words=words))
             case "Backlash":
-                half, words = self._value(given.get("half_width")), law.get("half_width", "")
-                label = law.get("stiffness", "")
-                scheme.links.append(Link("backlash", left, right, label, words=words, half=half))
+                half, words = self.number(laws["half_width"]), law["half_width"]
+                scheme.links.append(Link("backlash", left, right, law["stiffness"], words=words, half=half))
             case "PreloadedSpring":
-                label = r",\ ".join(filter(None, (law.get("preload"), law.get("stiffness"))))
+                label = r",\ ".join(filter(None, (law["preload"], law["stiffness"])))
                 scheme.links.append(Link("preload", left, right, label))
 
     def _place(self, where: Any, along: list[Any]) -> tuple[dict[int, int], Any] | None:
@@ -229,23 +229,6 @@ class _SchemeReader:
         moves = (lambda t: self.number(rest.subs(self.t, t))) if rest.has(self.t) else None
         words = self.text(rest) if rest != 0 else ""
         return Link(kind, left, right, label, self.number(rest), words, damped=damped, pulls=pulls, gap_at=moves)
-
-    def _law(self, node: ast.expr) -> str:
-        """An argument of an element as LaTeX."""
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            return self.latex.get(node.value) or latex_name(node.value)
-        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-            return f"{node.value:.4g}"
-        words = ast.unparse(node)
-        if words.startswith("p.") and (symbol := self.latex.get(words.removeprefix("p."))):
-            return symbol
-        return "f(v)" if "v" in {n.id for n in ast.walk(node) if isinstance(n, ast.Name)} else ""
-
-    def _value(self, node: ast.expr | None) -> float:
-        if not isinstance(node, ast.Constant):
-            return 0.0
-        value: Any = node.value
-        return float(self.system.values.get(value, 0.0) if isinstance(value, str) else value)
 
     # Transitions of a system's own
 
@@ -276,12 +259,3 @@ class _SchemeReader:
             if place is not None:
                 words = "" if self.is_zero(place[1]) else self.text(-place[1])
                 scheme.links.append(Link("friction", *self._ends(place[0]), "", words=words))
-
-
-def _keywords(text: str) -> dict[str, ast.expr]:
-    """The arguments of an element as it was given."""
-    try:
-        call = ast.parse(text, mode="eval").body
-    except SyntaxError:  # a law that is no expression of Python
-        return {}
-    return {one.arg: one.value for one in call.keywords if one.arg} if isinstance(call, ast.Call) else {}

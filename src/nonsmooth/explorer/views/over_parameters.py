@@ -113,11 +113,9 @@ class Diagram(View):
         super().paint(dark)
         self.redraw()
 
-    def redraw(self) -> None:
+    def draw(self, result: Any) -> None:
         """Draw the points anew, as at another zoom."""
-        result, state = self.results.get("diagram"), self.state
-        if result is None:
-            return
+        state = self.state
         points, values = result["section"].sel(state=state.shown), result[state.over].values
         finite = points.values[np.isfinite(points.values)]
         key = (state.model, state.over, state.shown)
@@ -152,12 +150,11 @@ class Diagram(View):
         # the state may have another direction by now
         words = self._clouds(self._shown.get("direction", ""))
         each = [points.sel(direction=word) for word in words] if "direction" in points.dims else [points]
-        over = self.state.over
-        flat = (one.transpose(over, ...).values.reshape(one.sizes[over], -1) for one in each)
-        return [
-            (cloud, colors[self.dark], size)
-            for cloud, (colors, size) in zip(flat, map(_CLOUDS.__getitem__, words), strict=True)
-        ]
+        over, layers = self.state.over, list[Layer]()
+        for word, one in zip(words, each, strict=True):
+            colors, size = _CLOUDS[word]
+            layers.append((one.transpose(over, ...).values.reshape(one.sizes[over], -1), colors[self.dark], size))
+        return layers
 
     def place(self) -> None:
         """Mark the value that the page is at, in the range that it has."""
@@ -338,11 +335,9 @@ class Response(View):
         self.ink(_DIRECTIONS["down"], down)
         self.ink(GREY, rings)
 
-    def redraw(self) -> None:
+    def draw(self, result: Any) -> None:
         """Draw the amplitude of the state that the diagram shows."""
-        result, shown = self.results.get("response"), self.state.shown
-        if result is None:
-            return
+        shown = self.state.shown
         over = str(result["maximum"].dims[0])
         values, (_, unit), (_, units) = result[over].values, self.quantity(over), self.quantity(shown)
         for word, source in self._curves.items():

@@ -121,11 +121,8 @@ class Chart(CellImage):
             self._stage = job["view"]
         super().show(job, found)
 
-    def redraw(self) -> None:
+    def draw(self, result: Any) -> None:
         """Draw the period numbers, and tell the exponents of the nearest points where they are known."""
-        result = self.results.get("chart")
-        if result is None:
-            return
         over, across = (str(dim) for dim in result["status"].dims[:2])
         x, y = result[over].values, result[across].values
         classes, entries = classes_of(result.transpose(across, over, ...))
@@ -195,11 +192,8 @@ class Basins(CellImage):
             self._stage = job["view"]
             super().show(job, found)
 
-    def redraw(self) -> None:
+    def draw(self, result: Any) -> None:
         """Draw labels and section points; nothing where the phase plane has other axes by now."""
-        result = self.results.get("basins")
-        if result is None:
-            return
         first, second = (str(dim) for dim in result["label"].dims)
         if (first, second) != (self.state.x, self.state.y):
             self.clear()

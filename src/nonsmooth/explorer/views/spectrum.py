@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from nonsmooth.explorer.figures import BLUE, Panel
@@ -32,11 +34,8 @@ class AmplitudeSpectrum(View):
         self.ink(BLUE, self._dots, field="fill_color")
         self.figure.tell(self._curve, mode="vline", attachment="right", point_policy="snap_to_data")
 
-    def redraw(self) -> None:
+    def draw(self, result: Any) -> None:
         """Draw the state of the phase plane's horizontal axis, as the time history does."""
-        result = self.results.get("spectrum")
-        if result is None:
-            return
         system, (latex, unit) = self.system, self.quantity(self.state.x)
         base, discrete = float(result["base_frequency"]), bool(result["period_number"])
         order, own, floor = lines_of(result, self.state.x, _LINES)

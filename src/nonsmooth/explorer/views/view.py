@@ -105,6 +105,11 @@ class View:
 
     def redraw(self) -> None:
         """Draw what is there, as for other axes."""
+        if (result := self.results.get(self.name)) is not None:
+            self.draw(result)
+
+    def draw(self, result: Any) -> None:
+        """Draw the result that has the name of the view."""
 
     def place(self) -> None:
         """Mark where the page is."""
