@@ -130,6 +130,15 @@ def test_three_methods_are_enough_and_motion_without_contact_is_that_of_the_form
     assert (found["amplitude_uncertainty"].values < 5e-3 * formula).all()
 
 
+def test_a_branch_that_leaves_its_range_with_the_first_step_is_a_result_of_no_point():
+    held = ns.Holding(**BRIEFLY)
+    found = ns.control_based_continuation(
+        free_motion(), "frequency", (6.5, 6.8), direction="down", holding=held, **WITHOUT_CONTACT
+    )
+    assert found.sizes["point"] == found.sizes["special"] == 0 and found["position_sine"].dims == ("point", "harmonic")
+    assert str(found["ended_because"].values) == "The branch reached the edge of the range."
+
+
 def test_ctrl_c_leaves_the_rig_without_a_force_and_keeps_the_points():
     rig = Bare(free_motion(), calls=25_000)
     with pytest.raises(ns.Interrupted) as caught:

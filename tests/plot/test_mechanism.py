@@ -234,3 +234,23 @@ def test_a_measured_input_is_a_force_and_no_mass() -> None:
     with pytest.warns(UserWarning, match="interpolated by cubic splines"):  # the record does not hold the samples
         found = ns.table(run, ["q"], samples=[0.5])
     assert found["q"][0] == pytest.approx(0.5 * (1 - np.cos(1.0)), abs=1e-7)  # 4 N on 2 kg and 8 N/m
+
+
+def test_laws_are_written_as_they_are_and_what_none_gives_by_its_value() -> None:
+    elements = {
+        "buffer": E.ElasticStop(at="q", position=0.5, stiffness=lambda t, u, p: 2 * p.k),
+        "snub": E.ElasticStop(at="q", position=1.0, stiffness="k", damping=lambda t, u, p: p.k / 10),
+        "rub": E.Coulomb(at="q", friction=lambda v, p: p.mu / (1 + v)),
+        "wall": E.Stop(at="q", position=-1.0, side=-1),
+    }
+    parameters = {"k": 3.0, "mu": 0.2}
+    system = ns.mechanical([[1.0]], [[0.1]], [[1.0]], parameters=parameters, elements=elements)
+    found = {
+        (one.kind, one.label, one.damped) for one in scheme_of(system).links if one.kind not in ("spring", "damper")
+    }
+    assert found == {
+        ("elastic", "2 k", False),
+        ("elastic", "k", True),
+        ("friction", "f(v)", False),
+        ("stop", "e = 0", False),
+    }

@@ -241,8 +241,8 @@ def test_held_motions_have_bars_of_two_uncertainties_and_their_stability() -> No
 def test_theory_behind_held_motions_leaves_the_axes_to_them(branch: xr.Dataset) -> None:
     result = held_branch()
     ax = plot.controlled_branch(result, theory=branch)
-    assert ax.get_xlim() == pytest.approx((5.0 - 0.05 * 0.9, 5.9 + 0.08 * 0.9))
-    assert ax.get_ylim() == pytest.approx((1.0 - 0.05 * 3.0, 4.0 + 0.08 * 3.0))
+    alone = plot.controlled_branch(result)  # held motions with their bars
+    assert (ax.get_xlim(), ax.get_ylim()) == (alone.get_xlim(), alone.get_ylim())
     half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values
     assert any(set(half[:5]) <= set(line.get_ydata()) for line in ax.lines)
     with pytest.raises(ValueError, match="the result is over 'omega', this branch over 'rho'"):

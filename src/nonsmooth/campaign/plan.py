@@ -109,15 +109,12 @@ def plan(work: ChunkedWork, *, seconds: float = SECONDS, seed: int = 0, kept: in
 
 
 def _spread(n: int, seed: int) -> Any:
-    """All chunks in an order whose every beginning lies evenly over the whole: multiples of the golden ratio.
+    """All chunks in an order whose every beginning lies evenly over the whole: by multiples of the golden ratio.
 
     The cost of a point changes from region to region; an even sample knows its mean better than a random one.
     """
     begin = np.random.default_rng(seed).random()
-    met = np.floor((begin + GOLDEN * np.arange(2 * n)) % 1.0 * n).astype(np.int64)
-    _, first = np.unique(met, return_index=True)
-    ordered = met[np.sort(first)]
-    return np.append(ordered, np.setdiff1d(np.arange(n), ordered))
+    return np.argsort((begin + GOLDEN * np.arange(n)) % 1.0)
 
 
 def _resident() -> int:

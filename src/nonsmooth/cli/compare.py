@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -65,85 +65,91 @@ def run(options: argparse.Namespace) -> int:
         return _run_folder(options)
     if options.identified is not None or options.identified_from is not None:
         raise ValueError("--identified and --identified-from go with a session folder; a study file has [identified]")
-    return _run_study(_read(options.study), options.study.parent, options.quiet)
+    study = _read(options.study)
+    _Theory(study, options.study.parent).compare(study["measured"], options.quiet)
+    return 0
 
 
 def _run_folder(options: argparse.Namespace) -> int:
     """Everything in a session that a model can be laid over: a response, a rise, and each section by itself."""
-    from nonsmooth.recordings.session import load_session
     from nonsmooth.studies import study as package
 
     lab = package("savi2007", "comparison")
 
-    here = Path()
-    read = cache(load_session)  # each file once, however many runs of it are compared
-    session = read(options.study.resolve())
+    study: dict[str, Any] = {"system": {"model": options.model}}
+    if options.identified is not None:
+        study["identified"] = {"data": str(options.identified.resolve())}
+        if options.identified_from is not None:
+            study["identified"]["session"] = str(options.identified_from.resolve())
+    theory, place = _Theory(study, Path()), str(options.study.resolve())
+    session = theory.session(place)
     wanted: list[dict[str, Any]] = []
     for procedure in session.procedures:
         runs = [item for item in session.recordings(procedure) if "gap" in item.settings]
         if not runs or procedure not in lab.SHOWS:
             continue
         shown: list[dict[str, Any]] = [{}] if lab.SHOWS[procedure] != "motion" else [{"run": item.run} for item in runs]
-        wanted += [{"session": str(options.study.resolve()), "procedure": procedure, **one} for one in shown]
+        wanted += [{"session": place, "procedure": procedure, **one} for one in shown]
     if not wanted:
         raise ValueError(
             f"{options.study}: has no run with the support mounted; it has: {', '.join(session.procedures)}"
         )
-    study: dict[str, Any] = {"system": {"model": options.model}}
-    if options.identified is not None:
-        study["identified"] = {"data": str(options.identified.resolve())}
-        if options.identified_from is not None:
-            study["identified"]["session"] = str(options.identified_from.resolve())
-    _, parameters = _theory(study, here)
-    reference = lab.gap_reference(session, offset=_offset(study, parameters, session, here, read))
+    reference = lab.gap_reference(session, offset=theory.offset(session))
     for measured in wanted:
-        whole = {**study, "measured": {**measured, "reference": reference}}
-        _run_study(whole, here, options.quiet, keep=False, read=read)
+        theory.compare({**measured, "reference": reference}, options.quiet, keep=False)
     return 0
 
 
-def _run_study(
-    study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool = True, read: Callable[[Path], Any] | None = None
-) -> int:
-    from nonsmooth.identification.compare import compare
-    from nonsmooth.recordings.session import load_session
-    from nonsmooth.studies import study as package
+class _Theory:
+    """The model of a study, at identified parameters where it has them; each session is read once."""
 
-    system, parameters = _theory(study, folder)
-    table = dict(study["measured"])
-    read = read or load_session
-    session = read(folder / table.pop("session"))
-    procedure, runs = table.pop("procedure"), table.pop("run", None)
-    k = float((parameters or system.values).get("k", system.values.get("k", 1.0)))
-    if "gap_offset" not in table and "reference" not in table:
-        table["gap_offset"] = _offset(study, parameters, session, folder, read)
-    measured, settings = package("savi2007", "comparison").session_measurement(session, procedure, runs, k=k, **table)
-    given = dict(study.get("compare", {}))
-    settings |= given.pop("settings", {})
-    if procedure == "rise":
-        given.setdefault("parameter", "rho")
-        given.setdefault("direction", "up")
-    result = compare(measured, system, parameters=parameters, settings=settings, **given)
-    output = study.get("output", {})
-    written = write(result, output, folder, lambda plot: _draw(plot, result, output))
-    if not quiet:
-        print(_summary(result))
-        for path in written:
-            print(f"written to {path}")
-        if keep and not written:
-            print("nothing was kept: the file has no [output] with `data` or `figure`")
-    return 0
+    def __init__(self, study: Mapping[str, Any], folder: Path) -> None:
+        from nonsmooth.identification.parameter_set import ParameterSet
+        from nonsmooth.recordings.session import load_session
+        from nonsmooth.results.store import load
 
+        self.study, self.folder = study, folder
+        self.session = cache(lambda name: load_session(folder / name))
+        found = study.get("identified")
+        self.parameters = None if found is None else ParameterSet.from_dataset(load(folder / found["data"]))
+        self.system = system_of(study["system"], folder)
 
-def _offset(study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]) -> Any:
-    """Identified gap less the screw's reading; 0 where the gap was not identified, or not from contact."""
-    from nonsmooth.studies import study as package
+    def offset(self, session: Any) -> Any:
+        """Identified gap less the screw's reading; 0 where the gap was not identified, or not from contact."""
+        from nonsmooth.studies import study as package
 
-    if "gap_at_rest" not in getattr(parameters, "extra", {}):
-        return 0.0
-    source = study["identified"].get("session")
-    origin = session if source is None else read(folder / source)
-    return package("savi2007", "comparison").gap_offset(parameters, origin) if origin.recordings("contact") else 0.0
+        if "gap_at_rest" not in getattr(self.parameters, "extra", {}):
+            return 0.0
+        source = self.study["identified"].get("session")
+        origin = session if source is None else self.session(source)
+        found = package("savi2007", "comparison").gap_offset
+        return found(self.parameters, origin) if origin.recordings("contact") else 0.0
+
+    def compare(self, asked: Mapping[str, Any], quiet: bool, keep: bool = True) -> None:
+        """Lay a measurement over the model, as a table [measured] says; write and print what is asked for."""
+        from nonsmooth.identification.compare import compare
+        from nonsmooth.studies import study as package
+
+        table, given = dict(asked), dict(self.study.get("compare", {}))
+        session = self.session(table.pop("session"))
+        procedure, runs = table.pop("procedure"), table.pop("run", None)
+        k = float((self.parameters or self.system.values).get("k", self.system.values.get("k", 1.0)))
+        if "gap_offset" not in table and "reference" not in table:
+            table["gap_offset"] = self.offset(session)
+        lab = package("savi2007", "comparison")
+        measured, settings = lab.session_measurement(session, procedure, runs, k=k, **table)
+        settings |= given.pop("settings", {})
+        if procedure == "rise":
+            given = {"parameter": "rho", "direction": "up", **given}
+        result = compare(measured, self.system, parameters=self.parameters, settings=settings, **given)
+        output = self.study.get("output", {})
+        written = write(result, output, self.folder, lambda plot: _draw(plot, result, output))
+        if not quiet:
+            print(_summary(result))
+            for path in written:
+                print(f"written to {path}")
+            if keep and not written:
+                print("nothing was kept: the file has no [output] with `data` or `figure`")
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -156,15 +162,6 @@ def _read(path: Path) -> dict[str, Any]:
     if "data" not in document.get("identified", {"data": ""}):
         raise ValueError(f'{path}: table [identified] needs data = "..." (a file that `nonsmooth identify` wrote)')
     return document
-
-
-def _theory(study: Mapping[str, Any], folder: Path) -> tuple[Any, Any]:
-    from nonsmooth.identification.parameter_set import ParameterSet
-    from nonsmooth.results.store import load
-
-    found = study.get("identified")
-    parameters = None if found is None else ParameterSet.from_dataset(load(folder / found["data"]))
-    return system_of(study["system"], folder), parameters
 
 
 def _draw(plot: Any, result: xr.Dataset, output: Mapping[str, str]) -> Any:

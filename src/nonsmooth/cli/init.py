@@ -116,20 +116,17 @@ def _settings(system: Any, verb: str) -> dict[str, Any]:
 
 def _start(system: Any) -> dict[str, Any]:
     """A start on the admissible side of all stops, where the state zero, the default, is not on it."""
-    traced = system.traced
+    import numpy as np
+
+    from nonsmooth.system.symbolic.numeric import numeric
+
+    traced, size = system.traced, system.scale_vector()
     stops = [jump.rows for jump in traced.transitions if jump.source == 0 and jump.reset is not None and jump.rows]
-    at = {symbol: system.values[name] for symbol, name in zip(traced.p, traced.parameter_names, strict=True)}
-
-    def admissible(state: list[float]) -> bool:
-        place = {**at, traced.t: 0.0, **dict(zip(traced.u, state, strict=True))}
-        place |= dict(zip(traced.m, system.memory_vector().tolist(), strict=True))
-        return all(any(row.sign * traced.indicators[row.indicator].subs(place) < 0 for row in rows) for rows in stops)
-
-    sizes = list(system.scale.values())
-    tried = [[0.0] * len(sizes), sizes, [-size for size in sizes]]
-    for i, size in enumerate(sizes):
-        tried += [[sign * size * (k == i) for k in range(len(sizes))] for sign in (1.0, -1.0)]
-    found = next((state for state in tried if admissible(state)), tried[0])
+    along = [sign * row for row in np.diag(size) for sign in (1.0, -1.0)]
+    tried = np.stack([0.0 * size, size, -size, *along])
+    h = numeric(traced, traced.indicators)(system.parameter_vector(), 0.0, tried, system.memory_vector())
+    before = [np.any([row.sign * h[:, row.indicator] < 0 for row in rows], axis=0) for rows in stops]
+    found = tried[np.argmax(np.all(before, axis=0))].tolist()  # zero where none is
     return {"start": dict(zip(system.states, found, strict=True))} if any(found) else {}
 
 

@@ -41,11 +41,13 @@ def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.study import read_study
 
     study = read_study(options.study)
+    from nonsmooth.campaign.run import connect
+
     began = time.perf_counter()
     store = options.store or study.store
     if store and "data" in study.output and store.resolve() == (study.path.parent / study.output["data"]).resolve():
         raise ValueError(f"--store {store} is where the result is to be written (data): give another name")
-    with _connected(options.scheduler) as client:
+    with nullcontext() if options.scheduler is None else connect(options.scheduler) as client:
         try:
             result = study.compute(progress=not options.quiet, store=store, client=client)
         except KeyboardInterrupt:
@@ -64,15 +66,3 @@ def run(options: argparse.Namespace) -> int:
         if not written and not store:
             print("nothing was kept: the file has no [output] with `data`, `figure` or `store`")
     return 0
-
-
-def _connected(address: str | None) -> Any:
-    """A client of the scheduler at an address, for a ``with`` block; None without an address."""
-    if address is None:
-        return nullcontext()
-    from nonsmooth.campaign.run import connect
-
-    try:
-        return connect(address)
-    except ImportError as error:  # the message says what to install
-        raise ValueError(str(error)) from error

@@ -111,7 +111,7 @@ def branch_dataset(
         (): {
             "turns": (np.int64(march.holder.turns), "turns of the drive in all"),
             "ended_because": (ENDINGS.get(ending, ending), "how the branch ends"),
-            other: (float(np.mean(fixed)), other, names.unit(other)),
+            other: (float(np.mean(fixed)) if points else np.nan, other, names.unit(other)),
         },
     }
     found = {name: labelled(dims, *row) for dims, rows in tables.items() for name, row in rows.items()}

@@ -9,14 +9,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.explorer.state import number_of
-from nonsmooth.system.kinds import Limit, above, at_least
+from nonsmooth.system.kinds import Limit, above, at_least, reader_of
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Page
@@ -196,10 +196,8 @@ def _numbers(quantities: Mapping[str, FormNumber], row: Mapping[str, Any], where
 
 
 def _number(value: Any, quantity: FormNumber, where: str) -> float:
-    number = number_of(value, f"{where}, {quantity.label}")
-    if not quantity.limit.holds(number):
-        raise ValueError(f"{where}, {quantity.label} = {number:g} must be {quantity.limit.words}")
-    return number
+    name = f"{where}, {quantity.label}"
+    return float(reader_of(Annotated[float, quantity.limit])(number_of(value, name), name))
 
 
 def _matrix(p: Any, letter: str, n: int) -> list[list[Any]]:

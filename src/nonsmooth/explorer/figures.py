@@ -10,7 +10,7 @@ from bokeh.models import ColumnDataSource, CustomJSTickFormatter, HoverTool, NoO
 from bokeh.plotting import figure
 from bokeh.themes import Theme
 
-from nonsmooth.explorer.labels import axis_label, power_of
+from nonsmooth.explorer.labels import PREFIXES, axis_label, power_of
 from nonsmooth.plot.style import COLORS
 
 MOST = 64  # section points that are told apart one by one
@@ -66,7 +66,19 @@ class _Axis:
     def name(self, latex: str, unit: str, of: str = "") -> None:
         power = power_of(unit, self.range.start, self.range.end)
         self.say(of + axis_label(latex, unit, power))
-        self.axis.formatter.args = {"power": power}
+        text = "" if unit in ("", "1") else f" {PREFIXES[power]}{unit}"
+        self.axis.formatter.args = {"power": power, "unit": text}
+
+    def show(self, low: float, high: float) -> None:
+        """Set the range, also that which a reset comes back to."""
+        self.range.update(start=low, end=high, reset_start=low, reset_end=high)
+
+    def fit(self, values: Any, margin: float = 0.06, anew: bool = False) -> None:
+        """Show values with a margin; a range that shows them well stays, unless it is wanted ``anew``."""
+        low, high = extent(values, margin)
+        start, end, room = self.range.start, self.range.end, 0.05 * (high - low)
+        if anew or not (start <= low + room and high - room <= end and high - low > 0.5 * (end - start)):
+            self.show(low, high)
 
     def say(self, words: str | None) -> None:
         if self.title is None:
@@ -125,9 +137,9 @@ class Panel:
 
     def show(self, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> None:
         """Set the ranges, also those that a reset comes back to."""
-        for one, ends in ((self.plot.x_range, x), (self.plot.y_range, y)):
+        for axis, ends in ((self.x, x), (self.y, y)):
             if ends is not None:
-                one.update(start=ends[0], end=ends[1], reset_start=ends[0], reset_end=ends[1])
+                axis.show(*ends)
 
 
 def cells_of(x: Any, y: Any) -> dict[str, list[float]]:

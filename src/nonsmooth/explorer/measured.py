@@ -40,7 +40,7 @@ def read(job: Mapping[str, Any]) -> dict[str, Any]:
     runs: dict[str, dict[str, Channel]] = {}
     for run, node in recording.tree.children.items():
         runs[str(run)] = {
-            str(channel): Channel(str(array.attrs["units"]), array[array.dims[0]].values, array.values)
+            str(channel): Channel(array.attrs["units"], array[array.dims[0]].values, array.values)
             for leaf in node.children.values()
             for channel, array in leaf.to_dataset().data_vars.items()
         }

@@ -6,10 +6,11 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import parse_qsl, urlencode
 
 from nonsmooth.explorer.kinds import PANELS, SETTINGS
+from nonsmooth.system.kinds import above, at_least, reader_of
 
 #: Fields that hold one of these words, with what a person reads for it.
 CHOICES: dict[str, dict[str, str]] = {
@@ -23,8 +24,12 @@ CHOICES: dict[str, dict[str, str]] = {
     "method": {"auto": "exact or Taylor", "smoothed": "smoothed switch", "rkf45": "RKF45"},
     **PANELS,
 }
-#: Whole numbers, with their limits.
-_WHOLE = {"transient": (0, 100_000), "keep": (4, 2000), "columns": (10, 4000)}
+#: Whole numbers, with their limits, and what each number of a page may be.
+_WHOLE = {"transient": at_least(0, 100_000), "keep": at_least(4, 2000), "columns": at_least(10, 4000)}
+_NUMBERS: dict[str, Any] = {name: Annotated[int, limit] for name, limit in _WHOLE.items()} | {
+    "eta": Annotated[float, above(0)],
+    **dict.fromkeys(("phase", "low", "high"), float),
+}
 
 
 #: Numbers as they are written; ``float`` takes underscores and the digits of every script besides.
@@ -152,21 +157,15 @@ def changed(state: PageState, name: str, value: Any, states: Sequence[str]) -> P
         if len(parts) != len(states):
             raise ValueError(f"start: give {len(states)} numbers, of {', '.join(states)}")
         return state.but(name, tuple(number_of(part, name) for part in parts))
-    if name in (*_WHOLE, "phase", "eta", "low", "high"):
-        number = number_of(value, name)
-        least, most = _WHOLE.get(name, (-math.inf, math.inf))
-        if name in _WHOLE and (number != int(number) or not least <= number <= most):
-            raise ValueError(f"{name} = {value}: give a whole number from {least} to {most}")
-        if name == "eta" and number <= 0:
-            raise ValueError(f"eta = {number:g}: half the width of the band must be greater than 0")
-        return state.but(name, int(number) if name in _WHOLE else number % 1.0 if name == "phase" else number)
+    if name in _NUMBERS:
+        number = reader_of(_NUMBERS[name])(number_of(value, name), name)
+        return state.but(name, number % 1.0 if name == "phase" else number)
     raise ValueError(f"{name!r} is nothing that a view holds")
 
 
 def within(name: str, value: int) -> int:
     """The nearest value that the page allows for a field that holds a whole number."""
-    least, most = _WHOLE[name]
-    return min(max(value, least), most)
+    return int(min(max(value, _WHOLE[name].low), _WHOLE[name].high))
 
 
 def number_of(value: Any, name: str) -> float:

@@ -266,7 +266,7 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: Annotated[float, a
     for line in (ax.axhspan, ax.axvspan):
         line(0.0, 0.0, color=muted, linewidth=0.3, zorder=0)
     if along:
-        name = str(data.attrs["parameter"])
+        name = data.attrs["parameter"]
         shade = np.broadcast_to(data[name].values[:, None], mu.shape)
         dots = ax.scatter(x, y, c=shade, s=4, cmap="viridis", linewidths=0, zorder=3)
         name_axes(ax.figure.colorbar(dots, ax=ax).ax, y=name_and_unit(data, name))
@@ -355,7 +355,7 @@ def controlled_branch(
     ValueError, TypeError
         A result of another verb, another quantity, a branch in another parameter.
     """
-    parameter, state = str(result.attrs["parameter"]), str(result["state"].values[0])
+    parameter, state = result.attrs["parameter"], str(result["state"].values[0])
     if theory is not None:
         check_axis(theory, parameter)
         if y == "control_effort":
@@ -368,9 +368,6 @@ def controlled_branch(
     else:
         values, amplitude = result[parameter].values, result["amplitude"].values
         ax.plot(values, amplitude, "-", color=style.COLORS["muted"], linewidth=0.5, zorder=2)
-        if theory is not None:
-            draw_branch(ax, theory, y=state, quantity="amplitude", special=False, color="black")
-            ax.set(xlim=_with_margin(values), ylim=_with_margin(amplitude[np.isfinite(amplitude)]))
         for kind, (face, words) in _LOOKS.items():
             here = result["stability"].values == kind
             if here.any():
@@ -382,10 +379,8 @@ def controlled_branch(
             at, color = result["special_value"].values, style.COLORS["second"]
             looks: dict[str, Any] = {"mark": "D", "face": "none", "size": 6.5, "label": "fold", "zorder": 5}
             style.points(ax, at, heights, xerr=bars, color=color, **looks)
+        if theory is not None:
+            ax.axis(ax.axis())  # those of what was measured
+            draw_branch(ax, theory, y=state, quantity="amplitude", special=False, color="black")
         name_plane(ax, result, parameter, state, "amplitude of ")
     ax.legend()
-
-
-def _with_margin(values: Any) -> tuple[float, float]:
-    low, high = float(np.min(values)), float(np.max(values))
-    return low - 0.05 * (high - low), high + 0.08 * (high - low)

@@ -11,6 +11,7 @@ from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_plane, one_of, only_states, with_unit
 from nonsmooth.plot.style import ABOVE
 from nonsmooth.plot.trajectories import edge_of, shade_zone
+from nonsmooth.results.provenance import read_provenance
 from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
@@ -74,7 +75,8 @@ def comparison_time(
         values = here[f"{side}_orbit"].values
         if side == "theory":
             part = here.isel({str(here["theory_orbit"].dims[0]): shown})
-            shade_reach(ax, part, phase[shown], color=THEORY, alpha=0.25, label=_band(result))
+            level = 100 * read_provenance(result)["options"].get("level", 0.95)
+            shade_reach(ax, part, phase[shown], color=THEORY, alpha=0.25, label=f"{level:g} % band")
             ax.plot(phase[shown], values[shown], color=THEORY, label="theory")
         else:
             some, word = shown[:: max(1, len(shown) // 120)], measured_label(result)
@@ -186,13 +188,6 @@ def comparison_distances(ax: Axes, result: xr.Dataset) -> None:
     ax.set_yticks(range(len(names)), names)
     ax.set(ylim=(-0.6, len(names) - 0.4), xlabel="energy distance (scaled)")
     ax.set_xlim(left=0)
-
-
-def _band(result: xr.Dataset) -> str:
-    from nonsmooth.results.provenance import read_provenance
-
-    level = float(read_provenance(result)["options"].get("level", 0.95))
-    return f"{100 * level:g} % band"
 
 
 def _check_orbits(result: xr.Dataset) -> None:

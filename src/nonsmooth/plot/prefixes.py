@@ -31,9 +31,9 @@ def together(axes: Sequence[tuple[str, float]]) -> list[float]:
     """Largest values (unit, largest) by which axes choose their prefixes: metres beside metres per second, where the
     smaller one is still read easily."""
     found = [most for _, most in axes]
-    firsts = {match[1] for unit, _ in axes if (match := FIRST.match(unit))}
+    firsts = [match[1] for unit, _ in axes if (match := FIRST.match(unit))]
     powers = [power_for(unit, most) for unit, most in axes]
-    if len(axes) == 2 and len(firsts) == 1 and powers[0] != powers[1] and all(FIRST.match(unit) for unit, _ in axes):
+    if len(firsts) == 2 and firsts[0] == firsts[1]:
         low = powers.index(min(powers))
         if found[low] >= _READ * 10.0 ** max(powers):
             found[low] = found[1 - low]

@@ -88,7 +88,8 @@ def _draw(ax: Axes, x: Any, y: Any, margins: FloatArray, band: bool) -> None:
     least, tilde = margins.min(axis=0), "" if band else r"\tilde "
     _fill(ax, x, y, least + band, _OUTSIDE, f"${tilde}G_-$")
     _fill(ax, x, y, band - least, _INSIDE, f"${tilde}G_+$")
-    for r, others in _others(margins):
+    for r in range(len(margins)):
+        others = np.delete(margins, r, axis=0).min(axis=0, initial=np.inf)
         color = style.COLORS[_LINES[r % 3]]
         name = f"${tilde}S{f'_{chr(97 + r)}' if len(margins) > 1 else ''}$"
         if band:
@@ -101,12 +102,6 @@ def _draw(ax: Axes, x: Any, y: Any, margins: FloatArray, band: bool) -> None:
         longest = max((np.asarray(path.vertices) for path in drawn.get_paths()), key=len)
         if len(longest):
             ax.annotate(name, longest[len(longest) // 2], (5, 2), textcoords="offset points", color=color)
-
-
-def _others(margins: FloatArray) -> list[tuple[int, FloatArray]]:
-    """For each row, the least of the other rows (infinite where there is one row only)."""
-    infinite = np.full((1, *margins.shape[1:]), np.inf)
-    return [(r, np.concatenate([np.delete(margins, r, axis=0), infinite]).min(axis=0)) for r in range(len(margins))]
 
 
 def _fill(ax: Axes, x: Any, y: Any, outside: FloatArray, color: str, name: str) -> None:

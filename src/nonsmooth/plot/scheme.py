@@ -71,26 +71,30 @@ class _SchemeReader:
         stiffness, damping = (
             [[-sp.diff(a, x).subs(self.still) for x in some] for a in self.acceleration] for some in (self.q, self.v)
         )
-        masses = self._masses(stiffness, damping)
-        scheme = Scheme(self.names, [self.text(m) if m is not None else "" for m in masses])
+        masses = self.masses = self._masses(stiffness, damping)
+        self.scheme = Scheme(self.names, [self.text(m) if m is not None else "" for m in masses])
         for kind, table in (("spring", stiffness), ("damper", damping)):
             for i in range(size):
                 of = masses[i] if masses[i] is not None else sp.Integer(1)
                 row = [sp.expand(of * entry) for entry in table[i]]
                 if not self.is_zero(*row):
-                    scheme.links.append(Link(kind, GROUND, i, self.text(sp.expand(sp.Add(*row)))))
+                    self.join(kind, GROUND, i, self.text(sp.expand(sp.Add(*row))))
                 for j in range(i):
                     if not self.is_zero(row[j]):
-                        scheme.links.append(Link(kind, j, i, self.text(-row[j])))
-        self._forces(scheme, masses)
+                        self.join(kind, j, i, self.text(-row[j]))
+        self._forces()
         if self.loads is not None and self.loads.elements:
             for load in self.loads.elements:
-                self._element(scheme, load)
+                self._element(load)
         else:
-            self._transitions(scheme, masses)
-        if not scheme.links:
+            self._transitions()
+        if not self.scheme.links:
             raise self._off("nothing joins them")
-        return scheme
+        return self.scheme
+
+    def join(self, *given: Any, **more: Any) -> None:
+        """Add a link."""
+        self.scheme.links.append(Link(*given, **more))
 
     # Expressions
 
@@ -162,28 +166,28 @@ class _SchemeReader:
     def _off(self, why: str) -> ValueError:
         return ValueError(f"{self.system.name!r} has no sketch, its coordinates are no masses on a line: {why}")
 
-    def _forces(self, scheme: Scheme, masses: list[Any]) -> None:
+    def _forces(self) -> None:
         """Forces on masses, and the motion of the base."""
         powers = {} if self.loads is None else self.loads.powers
         if "base" in powers:
-            scheme.base = r"\ddot y"
+            self.scheme.base = r"\ddot y"
         for i, v in enumerate(self.v):
             if "forcing" in powers:
                 force = sp.diff(powers["forcing"], v)
             else:
-                force = sp.expand(self.acceleration[i].subs(self.still) * (masses[i] or 1))
+                force = sp.expand(self.acceleration[i].subs(self.still) * (self.masses[i] or 1))
             if force != 0 and not force.has(sp.zoo, sp.nan):
-                scheme.forces[i] = self.text(force) or "F(t)"
+                self.scheme.forces[i] = self.text(force) or "F(t)"
 
     # Elements
 
-    def _element(self, scheme: Scheme, load: Any) -> None:
+    def _element(self, load: Any) -> None:
         speed = load.element.kinematics == "speed"
         place = self._place(load.where, self.v if speed else self.q)
         if place is None:
             if any(sp.diff(load.where, x).has(*self.u) for x in (*self.q, *self.v)):
                 raise self._off(f"the element {load.name!r} follows a curve")
-            scheme.others.append(f"{load.name}: {load.text}")
+            self.scheme.others.append(f"{load.name}: {load.text}")
             return
         weights, rest = place
         left, right = self._ends(weights)
@@ -194,16 +198,16 @@ class _SchemeReader:
             case "Stop" | "ElasticStop":
                 kind, key = ("stop", "restitution") if load.kind == "Stop" else ("elastic", "stiffness")
                 label = f"e = {law[key]}" if kind == "stop" and law[key][:1].isdigit() else law[key]
-                scheme.links.append(self._contact(kind, weights, rest, label, laws.get("damping", 0) != 0))
+                self._contact(kind, weights, rest, label, laws.get("damping", 0) != 0)
             case "Coulomb":
                 words = "" if self.is_zero(rest) else self.text(-rest)
-                scheme.links.append(Link("friction", left, right, law["friction"], words=words))
+                self.join("friction", left, right, law["friction"], words=words)
             case "Backlash":
                 half, words = self.number(laws["half_width"]), law["half_width"]
-                scheme.links.append(Link("backlash", left, right, law["stiffness"], words=words, half=half))
+                self.join("backlash", left, right, law["stiffness"], words=words, half=half)
             case "PreloadedSpring":
                 label = r",\ ".join(filter(None, (law["preload"], law["stiffness"])))
-                scheme.links.append(Link("preload", left, right, label))
+                self.join("preload", left, right, label)
 
     def _place(self, where: Any, along: list[Any]) -> tuple[dict[int, int], Any] | None:
         """Weights of one or two masses, of size one, and what is left; None for all else."""
@@ -218,8 +222,8 @@ class _SchemeReader:
     def _ends(weights: dict[int, int]) -> tuple[int, int]:
         return (GROUND, next(iter(weights))) if len(weights) == 1 else (min(weights), max(weights))
 
-    def _contact(self, kind: str, weights: dict[int, int], rest: Any, label: str, damped: bool) -> Link:
-        """A contact by its gap: that of one mass is on its right where the gap falls with the coordinate."""
+    def _contact(self, kind: str, weights: dict[int, int], rest: Any, label: str, damped: bool) -> None:
+        """Add a contact by its gap: that of one mass is on its right where the gap falls with the coordinate."""
         left, right = self._ends(weights)
         pulls = False
         if left == GROUND:
@@ -228,11 +232,11 @@ class _SchemeReader:
             pulls = weights[right] < 0
         moves = (lambda t: self.number(rest.subs(self.t, t))) if rest.has(self.t) else None
         words = self.text(rest) if rest != 0 else ""
-        return Link(kind, left, right, label, self.number(rest), words, damped=damped, pulls=pulls, gap_at=moves)
+        self.join(kind, left, right, label, self.number(rest), words, damped=damped, pulls=pulls, gap_at=moves)
 
     # Transitions of a system's own
 
-    def _transitions(self, scheme: Scheme, masses: list[Any]) -> None:
+    def _transitions(self) -> None:
         t = self.system._description.traced
         seen: set[Any] = set()
         for jump in t.transitions:
@@ -248,14 +252,14 @@ class _SchemeReader:
                 if jump.reset is not None:
                     e = -sp.diff(jump.reset[self.speeds[i]], self.v[i])
                     label = self.text(e)
-                    scheme.links.append(self._contact("stop", *place, f"e = {label}" if e.is_number else label, False))
+                    self._contact("stop", *place, f"e = {label}" if e.is_number else label, False)
                     continue
                 force = sp.expand(t.fields[jump.target][self.speeds[i]] - t.fields[jump.source][self.speeds[i]])
-                stiff = -sp.diff(force, self.q[i]) * (masses[i] or 1)
+                stiff = -sp.diff(force, self.q[i]) * (self.masses[i] or 1)
                 label = self.text(sp.simplify(stiff))
-                scheme.links.append(self._contact("elastic", *place, label, force.has(*self.v)))
+                self._contact("elastic", *place, label, force.has(*self.v))
         for surface in self.system.surfaces:
             place = self._place(t.indicators[surface.indicator], self.v)
             if place is not None:
                 words = "" if self.is_zero(place[1]) else self.text(-place[1])
-                scheme.links.append(Link("friction", *self._ends(place[0]), "", words=words))
+                self.join("friction", *self._ends(place[0]), "", words=words)

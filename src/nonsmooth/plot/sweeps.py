@@ -107,7 +107,7 @@ def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.Da
     if name in result["state"].values:
         return name_plane(ax, result, parameter, name, before)
     own = before + name_and_unit(result, name)[0]
-    return name_axes(ax, name_and_unit(result, parameter), (own, str(values.attrs.get("units", "1"))))
+    return name_axes(ax, name_and_unit(result, parameter), (own, values.attrs.get("units", "1")))
 
 
 @figure("bifurcation_diagram", "swept_section")
@@ -130,7 +130,7 @@ def bifurcation_diagram(
         Diameter of a point of the sweeps in typographic points.
     """
     (name,) = first_states(result, y)
-    parameter = str(result.attrs["parameter"])
+    parameter = result.attrs["parameter"]
     swept = result["swept_section"].sel(state=name).transpose(..., "sample").values
     style.cloud(ax, (result["swept_value"].values, swept), size, style.COLORS["pale"], "sweeps")
     for k in range(result.sizes["branch_id"]):
@@ -226,7 +226,7 @@ def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
     """Shade the cells of an axis in which a condition holds."""
     whole = inside.all([dim for dim in inside.dims if dim != parameter]).sortby(parameter)
     values, there = whole[parameter].values, np.repeat(whole.values, 2)
-    words = in_lines(str(inside.attrs.get("long_name", "region")), _LONGEST) if there.any() else None
+    words = in_lines(inside.attrs.get("long_name", "region"), _LONGEST) if there.any() else None
     ends = np.repeat(edges_of(values), 2)[1:-1]
     style.shade(ax, ends, there, color=style.COLORS["third"], alpha=0.15, zorder=0, label=words)
     ax.set_xlim(values[0], values[-1])

@@ -116,7 +116,7 @@ def _columns(
         plain = xr.DataArray(in_words(array) if "flag_values" in array.attrs else array.values, dims=array.dims)
         missing = [dim for dim in rows if dim not in plain.dims]
         full = plain.expand_dims({dim: data.sizes[dim] for dim in missing}).transpose(*rows)
-        unit = str(array.attrs.get("units", "1"))
+        unit = array.attrs.get("units", "1")
         flat[f"{name} ({unit})" if units and unit not in ("", "1") else name] = np.asarray(full.values).ravel()
     return flat
 

@@ -84,11 +84,7 @@ class Portrait(_Curves):
         self.put(run, *curves)
         self.lines.visible = not self.system.is_map  # of a map the iterates alone
         for axis, values, also in zip((figure.x, figure.y), curves, figure.beside, strict=True):
-            low, high = extent(np.concatenate([values, also]))
-            start, end = axis.range.start, axis.range.end
-            inside = start <= low + 0.05 * (high - low) and high - 0.05 * (high - low) <= end
-            if not (inside and high - low > 0.5 * (end - start)):
-                axis.range.update(start=low, end=high, reset_start=low, reset_end=high)
+            axis.fit(np.concatenate([values, also]))
         self.name_axes(state.x, state.y)
         zone = self._zone()
         self.zone.update(left=zone, visible=zone is not None)
@@ -132,7 +128,7 @@ class TimeHistory(_Curves):
         self.crossings.data = {"x": run["crossing_time"].values, "y": run["u_before"].sel(state=self.state.x).values}
         ends = extent(np.concatenate([values, self.figure.beside[1]]))
         self.figure.show((float(time[0]), float(time[-1])), ends)
-        self.figure.x.name("t", str(run["time"].attrs.get("units", "1")))
+        self.figure.x.name("t", run["time"].attrs.get("units", "1"))
         self.figure.y.name(*self.quantity(self.state.x))
 
     def legend(self) -> list[tuple[str, ...]]:
@@ -164,12 +160,10 @@ class SectionPoints(View):
         self.dots = plot.scatter("x", "y", source=self.points, size=4, line_color=None, fill_alpha=0.75)
         self.ink(BLUE, self.dots, field="fill_color")
 
-    def redraw(self) -> None:
+    def draw(self, result: Any) -> None:
         """Draw the points: a few as large dots on the whole orbit, so that they move in it with the phase."""
-        if "section" not in self.results:
-            return
         names, apart = (self.state.x, self.state.y), self.results["apart"]
-        points = self.results["section"]["section"].sel(state=list(names)).values
+        points = result["section"].sel(state=list(names)).values
         points = points[-len(apart) :][apart] if apart.sum() <= MOST else points
         few = len(points) <= MOST
         self.points.data = dict(zip("xy", points.T, strict=True))

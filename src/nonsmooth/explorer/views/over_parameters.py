@@ -119,9 +119,8 @@ class Diagram(View):
         points, values = result["section"].sel(state=state.shown), result[state.over].values
         finite = points.values[np.isfinite(points.values)]
         key = (state.model, state.over, state.shown)
-        if finite.size and (key != self._fitted or not self._fits(finite)):
-            # a few points far out, of columns that have not settled, do not decide the axis
-            self.figure.show(y=extent(np.quantile(finite, [0.001, 0.999]), 0.08))
+        if finite.size:  # a few points far out, of columns that have not settled, do not decide the axis
+            self.figure.y.fit(np.quantile(finite, [0.001, 0.999]), 0.08, key != self._fitted)
             self._fitted = key
         low, high = self.figure.plot.y_range.start, self.figure.plot.y_range.end
         self._image.data = {
@@ -133,12 +132,6 @@ class Diagram(View):
             "stage": ["judged" if self._shown["view"] == "diagram" else "first look"],
         }
         self.name_axes(state.over, state.shown)
-
-    def _fits(self, points: Any) -> bool:
-        """Return True if the present axis shows the points and they fill it well."""
-        low, high = np.quantile(points, [0.001, 0.999])
-        start, end = self.figure.plot.y_range.start, self.figure.plot.y_range.end
-        return bool(start <= low and high <= end and high - low > 0.55 * (end - start))
 
     def _clouds(self, direction: str) -> list[str]:
         """Names of the clouds that the diagram has, in a sweep of this direction."""
@@ -243,7 +236,7 @@ class Branches(View):
         result = self.results.get("branches", self.results.get("cycle"))
         if result is None:
             return
-        parameter = str(result.attrs["parameter"])
+        parameter = result.attrs["parameter"]
         unit = self.quantity(parameter)[1]
         lines: dict[str, list[Any]] = {line: [np.empty((2, 0))] for line in self._lines}
         points: list[tuple[Any, ...]] = []

@@ -12,7 +12,6 @@ from bokeh.models import CustomJSHover, LinearColorMapper
 from nonsmooth.arrays import FloatArray
 from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.figures import Panel, cells_of
-from nonsmooth.explorer.labels import PREFIXES, power_of
 from nonsmooth.explorer.views.motion import Portrait
 from nonsmooth.explorer.views.view import Ends, Request, Requests, View
 from nonsmooth.plot import palette
@@ -87,11 +86,8 @@ class CellImage(View):
     def name_axes(self, x: str, y: str, of: str = "") -> None:
         """Label the axes, in the prefixes that the words below the mouse have too."""
         super().name_axes(x, y, of)
-        for key, axis, name in (("x", self.figure.x, x), ("y", self.figure.y, y)):
-            unit = self.quantity(name)[1]
-            power = power_of(unit, axis.range.start, axis.range.end)
-            text = "" if unit in ("", "1") else f" {PREFIXES[power]}{unit}"
-            self._places[key].args = {"power": power, "unit": text}
+        for key, axis in (("x", self.figure.x), ("y", self.figure.y)):
+            self._places[key].args = dict(axis.axis.formatter.args)
 
 
 class Chart(CellImage):
@@ -130,7 +126,7 @@ class Chart(CellImage):
         if "exponents" in self.results:
             known = self.results["exponents"]["lyapunov"]
             more = known.sel({over: x, across: y}, method="nearest").transpose(across, over).values
-            unit = str(known.attrs.get("units", "1"))
+            unit = known.attrs.get("units", "1")
         self.put(x, y, classes, entries, self._stage, more, unit)
         self._legend = [*legend_of(classes, entries)]
         self.figure.show((self.state.low, self.state.high), (float(y[0]), float(y[-1])))
@@ -169,14 +165,13 @@ class Basins(CellImage):
     def requests(self, base: Requests) -> Requests:
         """Each finer than the one before it; initial values of states outside the plane are the page's."""
         state = self.state
-        start = zip(self.system.states, state.start, strict=True)
         return self.each(
             {
                 **{key: base["orbit"][key] for key in ("text", "values", "method", "eta", "transient")},
                 "x": state.x,
                 "y": state.y,
                 "begin": base["first look"]["begin"],
-                "fixed": {name: value for name, value in start if name not in (state.x, state.y)},
+                "fixed": {name: value for name, value in self.start.items() if name not in (state.x, state.y)},
                 "window": [self.setting(end) for end in self.ends],
             }
         )
@@ -240,8 +235,7 @@ class Basins(CellImage):
     def place(self) -> None:
         """Mark the initial state."""
         if "basins" in self.results:
-            start = dict(zip(self.system.states, self.state.start, strict=True))
-            self.here.data = {"x": [start[self.state.x]], "y": [start[self.state.y]]}
+            self.here.data = {"x": [self.start[self.state.x]], "y": [self.start[self.state.y]]}
 
     def clear(self) -> None:
         """Show nothing."""

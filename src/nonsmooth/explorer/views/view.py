@@ -55,6 +55,11 @@ class View:
         """The system of the page, at its own parameters."""
         return self.page.system
 
+    @property
+    def start(self) -> dict[str, float]:
+        """Initial values of the states."""
+        return dict(zip(self.system.states, self.state.start, strict=True))
+
     def setting(self, name: str) -> Any:
         """The value of a setting, by its name without the view's."""
         return setting(f"{self.name}.{name}", self.system, self.state)
@@ -130,8 +135,7 @@ class View:
 
     def started(self, **values: float) -> PageState:
         """The state with other initial values of some states."""
-        start = dict(zip(self.system.states, self.state.start, strict=True)) | values
-        return self.state.but("start", tuple(start.values()))
+        return self.state.but("start", tuple((self.start | values).values()))
 
     def zoomed(self, x: Ends, y: Ends) -> PageState:
         """The state after a zoom."""

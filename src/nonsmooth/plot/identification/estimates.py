@@ -87,7 +87,7 @@ def calibration(one: Picture, finding: Any) -> None:
 
 def _law(one: Picture) -> str:
     slope, intercept, error = (number(one.data, name) for name in ("slope", "intercept", "intercept_error"))
-    units = [str(one.data[name].attrs.get("units", "")) for name in ("reading", "setting")]
+    units = [one.data[name].attrs.get("units", "") for name in ("reading", "setting")]
     text = one.text("slope", ("/" if all(units) and "/" not in units[0] else " per ").join(units), before="slope ")
     # a line that does not pass through the origin: where it begins
     away = abs(intercept) > 5 * error and np.isfinite(intercept / slope)
@@ -169,7 +169,7 @@ def steady_readings(
         raise ValueError(unknown(over, "a parameter that was set", "these runs", set_))
     name = over or max(set_, key=lambda each: len(np.unique(part[each].values)))
     attrs, of = part["measured"].attrs, symbol_of(_quantity(part))
-    one.x = symbol_of(name), str(part[name].attrs.get("units", ""))
+    one.x = symbol_of(name), part[name].attrs.get("units", "")
     one.y = f"{attrs.get('long_name', 'reading')} of {of}", str(attrs.get("units", ""))
     used, residual = one.values("used", "residual")
     one.points(name, "measured")
@@ -179,7 +179,7 @@ def steady_readings(
 
 def _over_time(one: Picture, part: Any) -> None:
     one.data = part
-    one.y = symbol_of(_quantity(part)), str(part["measured"].attrs.get("units", ""))
+    one.y = symbol_of(_quantity(part)), part["measured"].attrs.get("units", "")
     modes = words_of_flags(part["mode"])
     time, mode, window, residual, fitted = one.values("time", "mode", "window", "residual", "fitted")
     one.cloud(time, part["measured"].values)
@@ -229,7 +229,7 @@ def profile(one: Picture, finding: Any) -> None:
     """
     data = one.data
     unit = str(data["value"].attrs.get("units", data.attrs.get("units", "")))
-    one.x = symbol_of(str(data.attrs.get("parameter", "value"))), unit
+    one.x = symbol_of(data.attrs.get("parameter", "value")), unit
     value, cost = one.values("value", "cost")
     one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
     one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
@@ -255,14 +255,11 @@ def coverage(ax: Axes, finding: Any) -> None:
     ax
         Where to draw; a new figure of page width if None.
     """
-    data = data_of(finding, "truth", "estimate", "uncertainty", "parameter")
-    truth, estimate, error = (
-        data[name].transpose("rig", "parameter").values for name in ("truth", "estimate", "uncertainty")
-    )
+    data = data_of(finding, "truth", "estimate", "uncertainty", "parameter").transpose("rig", "parameter", ...)
+    truth, estimate, error = (data[name].values for name in ("truth", "estimate", "uncertainty"))
     names = data["parameter"].values.astype(str)
     if "low" in data and "high" in data:
-        low, high = (data[name].transpose("rig", "parameter").values for name in ("low", "high"))
-        held = (low <= truth) & (truth <= high)
+        held = (data["low"].values <= truth) & (truth <= data["high"].values)
     else:
         held = np.abs(estimate - truth) <= 1.96 * error
     off = (estimate - truth) / error

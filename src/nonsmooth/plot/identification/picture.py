@@ -104,7 +104,7 @@ class Picture:
         x, y = (
             name
             if isinstance(name, tuple)
-            else (str(self.data[name].attrs.get("long_name", name)), str(self.data[name].attrs.get("units", "")))
+            else (self.data[name].attrs.get("long_name", name), self.data[name].attrs.get("units", ""))
             for name in (self.x, self.y)
         )
         name_axes(self.ax, x, y)
