@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as bar
 from nonsmooth.results.provenance import options_as_data, package_version
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import Range, above, at_least
+from nonsmooth.system.kinds import Natural, Positive, Range
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,11 +34,11 @@ def control_based_continuation(
     parameter: str,
     range: Range,
     *,
-    frequency: Annotated[float, above(0)],
+    frequency: Positive,
     amplitude: float,
     direction: Literal["up", "down"] = "up",
-    step: Annotated[float, above(0)] = 0.1,
-    points: Annotated[int, at_least(1)] = 100,
+    step: Positive = 0.1,
+    points: Natural = 100,
     holding: Holding = Holding(),  # noqa: B008  it is frozen
     progress: Progress = True,
 ) -> xr.Dataset:

@@ -19,7 +19,7 @@ from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.control.rig import Guard, Rig
 from nonsmooth.errors import SolveError
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import Range, above, at_least, real_number
+from nonsmooth.system.kinds import Count, Natural, Positive, Range, at_least, real_number
 
 
 class Samples(NamedTuple):
@@ -159,16 +159,16 @@ class Holding:
         Values that make no sense.
     """
 
-    mass: Annotated[float, above(0)] | None = None
+    mass: Positive | None = None
     gains: Annotated[tuple[float, float], "give (K_p, K_d), two numbers"] | None = None
-    greatest_force: Annotated[float, above(0)] | None = None
-    greatest_position: Annotated[float, above(0)] | Range | None = None
-    harmonics: Annotated[int, at_least(1)] | None = None
-    transient: Annotated[int, at_least(0)] = 50
-    settle: Annotated[int, at_least(1)] = 5
+    greatest_force: Positive | None = None
+    greatest_position: Positive | Range | None = None
+    harmonics: Natural | None = None
+    transient: Count = 50
+    settle: Natural = 5
     record: Annotated[int, at_least(3)] = 10
-    release: Annotated[int, at_least(0)] = 12
-    tolerance: Annotated[float, above(0)] = 1e-3
+    release: Count = 12
+    tolerance: Positive = 1e-3
 
     def __post_init__(self) -> None:
         if self.gains is not None and self.gains[1] <= 0:

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth.errors import SystemDefinitionError, unknown
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import above, at_least, real_number
+from nonsmooth.system.kinds import Count, above, at_least, real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -121,7 +121,7 @@ class SimulatedRig:
         resolution: Annotated[float, at_least(0)] = 0.0,
         noise: Annotated[float, at_least(0)] = 0.0,
         jitter: Annotated[float, at_least(0)] = 0.0,
-        seed: Annotated[int, at_least(0)] = 0,
+        seed: Count = 0,
         start: Any = None,
         method: Literal["auto", "exact", "taylor", "rkf45"] = "auto",
     ) -> None:

@@ -16,6 +16,7 @@ from nonsmooth.explorer.sketch import moving
 
 #: Hears the fraction done and says whether the work is still wanted.
 Heard = Callable[[float], bool]
+Results = dict[str, Any]  # by name
 
 _CHAOTIC = 40  # periods drawn of an orbit without a period
 _LONGEST = 12  # periods drawn of one that has a long one
@@ -71,7 +72,7 @@ class Job:
         return verb(self.system, *given, **{**usual, **named})
 
 
-def compute(asked: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
+def compute(asked: Mapping[str, Any], heard: Heard) -> Results:
     """The results of a view, by name; Datasets as the verbs return them.
 
     Parameters
@@ -101,7 +102,7 @@ def _at_one_point(job: Job, **named: Any) -> Any:
     return job.run(ns.sweep, name, [value], direction=None, **named)
 
 
-def _orbit(job: Job) -> dict[str, Any]:
+def _orbit(job: Job) -> Results:
     """The motion reached from a start: its period number and residual, and a record of it."""
     system, start, transient = job.system, job["start"], job["transient"]
     judged = _at_one_point(job, start=start, keep=job["keep"])
@@ -121,7 +122,7 @@ def periods_shown(period: int) -> int:
     return 2 * min(period, _LONGEST) if period else _CHAOTIC
 
 
-def _section(job: Job) -> dict[str, Any]:
+def _section(job: Job) -> Results:
     """Section points of the motion from a start, at a phase, and which of the last are apart."""
     from nonsmooth.flow.engines.methods import engine_for
 
@@ -148,7 +149,7 @@ def distinct(points: Any) -> Any:
     return apart
 
 
-def _sketch(job: Job) -> dict[str, Any]:
+def _sketch(job: Job) -> Results:
     """Pictures of the mechanism over one period of the motion, or some periods where it has none."""
     period, system = job["period"], _system(job["text"]).with_parameters(job["values"])
     shown = min(period, _MOST_MOVED) or 3
@@ -160,7 +161,7 @@ def _sketch(job: Job) -> dict[str, Any]:
     return {"sketch": moving(system, run.isel(time=np.searchsorted(time, instants, side="right") - 1))}
 
 
-def _stability(job: Job) -> dict[str, Any]:
+def _stability(job: Job) -> Results:
     """Floquet multipliers of a periodic orbit, or the Lyapunov exponents of a motion without a period."""
     if job["period"]:
         orbit = ns.find_orbit(
@@ -176,13 +177,13 @@ def _stability(job: Job) -> dict[str, Any]:
     return {"exponents": ns.lyapunov(job.system, start=job["start"], progress=job.heard, **span, **job.options)}
 
 
-def _first_look(job: Job) -> dict[str, Any]:
+def _first_look(job: Job) -> Results:
     """A diagram that nothing judged yet, every column from the same state, on all cores."""
     fast: dict[str, Any] = {"direction": None, "judge": False, "extremes": False}
     return {"diagram": job.run(ns.sweep, job["over"], job.values, start=job["begin"], keep=job["keep"], **fast)}
 
 
-def _diagram(job: Job) -> dict[str, Any]:
+def _diagram(job: Job) -> Results:
     """The diagram with period numbers and statuses."""
     over, direction, start, keep = (job[name] for name in ("over", "direction", "begin", "keep"))
     if direction == "many":
@@ -194,7 +195,7 @@ def _diagram(job: Job) -> dict[str, Any]:
     return {"diagram": job.run(ns.sweep, over, job.values, direction=direction, start=start, keep=keep)}
 
 
-def _branches(job: Job) -> dict[str, Any]:
+def _branches(job: Job) -> Results:
     """A ``bifurcation_diagram``; of a system without forcing the branch of one cycle."""
     over, ends = job["over"], (job["low"], job["high"])
     common = {"transient": job["transient"], "budget": _BUDGET, "progress": job.heard}
@@ -203,13 +204,13 @@ def _branches(job: Job) -> dict[str, Any]:
     return {"cycle": ns.continue_orbit(ns.find_orbit(job.system, start=job["start"], **common), over, ends)}
 
 
-def _response(job: Job) -> dict[str, Any]:
+def _response(job: Job) -> Results:
     """A ``frequency_response``."""
     named = {"parameter": job["over"], "start": job["begin"], "keep": job["keep"]}
     return {"response": job.run(ns.frequency_response, job.values, **named)}
 
 
-def _chart(job: Job) -> dict[str, Any]:
+def _chart(job: Job) -> Results:
     """A ``chart``; the finer ones infer what lies far from all boundaries."""
     view = job["view"]
     if not job["across"]:
@@ -224,7 +225,7 @@ def _chart(job: Job) -> dict[str, Any]:
     return {"chart": job.run(ns.chart, grid, start=job["begin"], refine=view != "first chart")}
 
 
-def _basins(job: Job) -> dict[str, Any]:
+def _basins(job: Job) -> Results:
     """``basins`` of the window; where none is given, of one around the motion from rest."""
     names, window = (job["x"], job["y"]), job["window"]
     if names[0] == names[1]:
@@ -250,12 +251,12 @@ def _around(job: Job, names: tuple[str, str]) -> list[float]:
     return ends
 
 
-def _spectrum(job: Job) -> dict[str, Any]:
+def _spectrum(job: Job) -> Results:
     """An ``amplitude_spectrum``."""
     return {"spectrum": job.run(ns.amplitude_spectrum, start=job["start"])}
 
 
-_WORK: dict[str, Callable[[Job], dict[str, Any]]] = {
+_WORK: dict[str, Callable[[Job], Results]] = {
     "orbit": _orbit,
     "section": _section,
     "sketch": _sketch,

@@ -21,7 +21,7 @@ from nonsmooth.plot.pen import put
 from nonsmooth.plot.trajectories import with_gaps
 from nonsmooth.results.whole import REMEDY, placed
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.kinds import Natural, Positive, at_least
 from nonsmooth.system.origin import system_of
 from nonsmooth.tables.sampled import sampled
 
@@ -41,8 +41,8 @@ def animate(
     x: str | None = None,
     y: str | None = None,
     history: str | None = None,
-    seconds: Annotated[float, above(0)] = 6.0,
-    rate: Annotated[int, at_least(1)] = 20,
+    seconds: Positive = 6.0,
+    rate: Natural = 20,
     pixels: Annotated[int, at_least(100)] = 720,
 ) -> Animation:
     """Animate a run: the sketch of its mechanism, the plane of two states and the history of one, together.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.labels import words_of_flags
-from nonsmooth.system.kinds import above
+from nonsmooth.system.kinds import Positive
 from nonsmooth.tables.quantities import dataset_of
 
 if TYPE_CHECKING:
@@ -237,7 +237,7 @@ def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: Any = No
 
 
 @figure(ratio=0.9)
-def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: Annotated[float, above(0)] | None = None) -> None:
+def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: Positive | None = None) -> None:
     """Draw the Floquet multipliers of an orbit, or those along a branch coloured by its parameter.
 
     Parameters

@@ -12,7 +12,7 @@ from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_
 from nonsmooth.plot.style import ABOVE
 from nonsmooth.plot.trajectories import edge_of, shade_zone
 from nonsmooth.results.provenance import read_provenance
-from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.kinds import Count, Positive, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,9 +49,7 @@ def one_phase(result: xr.Dataset, phase: int = 0) -> Any:
 
 
 @figure()
-def comparison_time(
-    ax: Axes, result: xr.Dataset, *, y: Name | None = None, periods: Annotated[float, above(0)] = 8
-) -> None:
+def comparison_time(ax: Axes, result: xr.Dataset, *, y: Name | None = None, periods: Positive = 8) -> None:
     """Draw a state over the phase of the drive: measured points, the predicted curve and its band.
 
     Parameters
@@ -141,7 +139,7 @@ def comparison_section(
     *,
     x: Name | None = None,
     y: Name | None = None,
-    phase: Annotated[int, at_least(0)] = 0,
+    phase: Count = 0,
 ) -> None:
     """Draw both section clouds in the plane of two states, with their energy distance beside that of halves.
 
@@ -199,9 +197,7 @@ def _check_orbits(result: xr.Dataset) -> None:
 
 
 @figure()
-def comparison_diagram(
-    ax: Axes, result: xr.Dataset, *, y: Name | None = None, size: Annotated[float, above(0)] = 1.6
-) -> None:
+def comparison_diagram(ax: Axes, result: xr.Dataset, *, y: Name | None = None, size: Positive = 1.6) -> None:
     """Draw a comparison of a diagram: theory as a pale cloud, measured points in black, flips as marks at the top.
 
     Parameters

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import variable_along
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import Default, above, at_least
+from nonsmooth.system.kinds import Default, Positive, at_least
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +39,7 @@ class Look(TypedDict, total=False):
     linestyle: Any
     linewidth: Annotated[float, at_least(0)] | None
     marker: Any
-    markersize: Annotated[float, above(0)] | None
+    markersize: Positive | None
     rasterized: bool | None
     zorder: float | None
 

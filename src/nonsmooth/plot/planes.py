@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, columns, in_lines, name_and_unit, name_axes, name_plane, one_of, only_states
 from nonsmooth.plot.prefixes import PREFIXES, power_for
 from nonsmooth.results.labels import in_words
-from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.kinds import Count, Positive
 from nonsmooth.tables.quantities import quantities_of, quantity
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def chart(
     *,
     show: str = "period_number",
     y: Name | None = None,
-    start: Annotated[int, at_least(0)] = 0,
+    start: Count = 0,
     contours: Mapping[str, float | Sequence[float]] | None = None,
     region: str | xr.DataArray | None = None,
 ) -> None:
@@ -208,7 +208,7 @@ _MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")  # one more than col
 
 
 @figure("basins", "label", ratio=0.85)
-def basins(ax: Axes, result: xr.Dataset, *, size: Annotated[float, above(0)] = 3.6) -> None:
+def basins(ax: Axes, result: xr.Dataset, *, size: Positive = 3.6) -> None:
     """Draw the result of ``basins``.
 
     Parameters

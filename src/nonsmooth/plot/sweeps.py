@@ -22,7 +22,7 @@ from nonsmooth.plot.labels import (
     only_states,
 )
 from nonsmooth.plot.planes import edges_of, held
-from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.kinds import Positive, at_least
 from nonsmooth.tables.quantities import quantities_of
 from nonsmooth.tables.quantities import quantity as quantity_of
 
@@ -41,7 +41,7 @@ def bifurcation(
     result: xr.Dataset,
     *over: xr.Dataset,
     y: Name | None = None,
-    size: Annotated[float, above(0)] = 0.8,
+    size: Positive = 0.8,
     color: Any = None,
 ) -> None:
     """Draw the section points of a ``sweep`` over its parameter, up and down in two colours, and branches over them.
@@ -112,7 +112,7 @@ def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.Da
 
 @figure("bifurcation_diagram", "swept_section")
 def bifurcation_diagram(
-    ax: Axes, result: xr.Dataset, *, y: Name | None = None, special: bool = True, size: Annotated[float, above(0)] = 0.8
+    ax: Axes, result: xr.Dataset, *, y: Name | None = None, special: bool = True, size: Positive = 0.8
 ) -> None:
     """Draw all section points of every branch, stable parts solid and unstable ones dashed, over those of the sweeps.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from nonsmooth.plot.labels import (
     variable_along,
 )
 from nonsmooth.results.labels import words_of_flags
-from nonsmooth.system.kinds import above
+from nonsmooth.system.kinds import Positive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,7 +159,7 @@ def section(
     *,
     x: Name | None = None,
     y: Name | None = None,
-    size: Annotated[float, above(0)] = 0.8,
+    size: Positive = 0.8,
 ) -> None:
     """Draw the section points of a ``poincare`` result (or of a ``sweep``, all its points together).
 
@@ -223,9 +223,7 @@ def lines_of(result: xr.Dataset, name: str, highest: float) -> tuple[FloatArray,
 
 
 @figure("amplitude_spectrum", "amplitude")
-def amplitude_spectrum(
-    ax: Axes, result: xr.Dataset, *, y: Name | None = None, highest: Annotated[float, above(0)] = 20.0
-) -> None:
+def amplitude_spectrum(ax: Axes, result: xr.Dataset, *, y: Name | None = None, highest: Positive = 20.0) -> None:
     """Draw an ``amplitude_spectrum`` of the state ``y`` (by default the first) over multiples of the base frequency.
 
     ``highest``: the largest multiple drawn. Lines below 1e-7 of the largest are left out, and so is the mean.

@@ -3,6 +3,7 @@
 ==============================================  =======================================================
 ``keep: Annotated[int, at_least(2)] = 100``     a whole number; 3.0 passes for 3; 2.5, True, "3" and NaN do not
 ``budget: Annotated[float, above(0)] = 60``     a finite number; ``at_least`` as well, both with a largest
+``size: Positive``, ``phase: Count``            the usual ones have names
 ``judge: bool = True``                          yes or no, also 0 and 1 or of NumPy; no word
 ``side: Literal["up", "down", None] = "up"``    one of these
 ``rtol: float | None = None``                   that, or None
@@ -80,6 +81,12 @@ def at_least(low: float, most: float = math.inf) -> Limit:
 def above(low: float, most: float = math.inf) -> Limit:
     """More than ``low``."""
     return Limit(low, most, without_low=True)
+
+
+#: A number above 0; whole numbers from 0 and from 1 on.
+Positive = Annotated[float, above(0)]
+Count = Annotated[int, at_least(0)]
+Natural = Annotated[int, at_least(1)]
 
 
 def real_number(value: Any, what: str, kind: str = "a real number") -> float:

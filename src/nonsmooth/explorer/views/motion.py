@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from bokeh.models import BoxAnnotation, LinearColorMapper
 
 from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
 from nonsmooth.explorer.labels import number, plain_of
-from nonsmooth.explorer.views.view import Request, Requests, View
+from nonsmooth.explorer.views.view import Legend, Request, Requests, Results, View
 from nonsmooth.plot import palette
 from nonsmooth.plot.labels import column
 from nonsmooth.plot.style import COLORS
@@ -68,7 +67,7 @@ class Portrait(_Curves):
             "x", "y", source=self.points, size=7, fill_color=COLORS["zone"], line_color="#1B1F24", line_width=1.0
         )
 
-    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+    def show(self, job: Request, found: Results) -> None:
         """Its exponents are not known yet, nor those that were asked for before another orbit was shown."""
         self.sheet.views["readout"].results.clear()
         self.sheet.undo("readout")
@@ -131,7 +130,7 @@ class TimeHistory(_Curves):
         self.figure.x.name("t", run["time"].attrs.get("units", "1"))
         self.figure.y.name(*self.quantity(self.state.x))
 
-    def legend(self) -> list[tuple[str, ...]]:
+    def legend(self) -> Legend:
         """Modes that the motion visits, in the colours that they have in the phase plane too."""
         run = self.sheet.results.get("run")
         seen = [] if run is None else np.unique(run["mode"].values).tolist()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from nonsmooth.explorer.labels import number
 from nonsmooth.explorer.raster import Layer, drawn
 from nonsmooth.explorer.schedule import key_of
 from nonsmooth.explorer.state import CHOICES
-from nonsmooth.explorer.views.view import Ends, Request, Requests, View
+from nonsmooth.explorer.views.view import Ends, Legend, Request, Requests, Results, View
 from nonsmooth.plot.branches import MARKS, lines_of, ordinates_of, with_breaks
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.sweeps import one_branch
@@ -76,7 +75,7 @@ class Diagram(View):
         self._pixels = max(pixels, 50)
         self.redraw()
 
-    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+    def show(self, job: Request, found: Results) -> None:
         """Draw a sweep, and tell its period numbers where they were judged."""
         self._shown = job
         super().show(job, found)
@@ -156,7 +155,7 @@ class Diagram(View):
         if (shown.start, shown.end) != (state.low, state.high):
             self.figure.show(x=(state.low, state.high))
 
-    def legend(self) -> list[tuple[str, ...]]:
+    def legend(self) -> Legend:
         """Clouds in the direction of the page, and the signs of the branches over them."""
         names = {"first look": "quick preview", **CHOICES["direction"]}
         clouds = [(names[word], _CLOUDS[word][0][self.dark]) for word in self._clouds(self.state.direction)]
@@ -267,7 +266,7 @@ class Branches(View):
         for source, rows in ((self._points, [one[:3] for one in special] + points), (self._marks, special)):
             source.data = {key: [row[k] for row in rows] for k, key in enumerate(source.data)}
 
-    def signs(self) -> list[tuple[str, ...]]:
+    def signs(self) -> Legend:
         """Lines and marks that are drawn, each with the sign that shows it."""
         if self.setting("show") != "yes":
             return []
@@ -361,7 +360,7 @@ class Response(View):
         drawn = [source.data["y"] for source in (*self._curves.values(), self._measured)]
         self.figure.show(y=(0.0, extent(np.concatenate(drawn))[1]))
 
-    def legend(self) -> list[tuple[str, ...]]:
+    def legend(self) -> Legend:
         """Directions of the sweep."""
         return [(words, _DIRECTIONS[words.split(",")[0]][self.dark]) for words in ("up", "down, dashed")]
 

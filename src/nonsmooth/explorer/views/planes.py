@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.figures import Panel, cells_of
 from nonsmooth.explorer.views.motion import Portrait
-from nonsmooth.explorer.views.view import Ends, Request, Requests, View
+from nonsmooth.explorer.views.view import Ends, Legend, Request, Requests, Results, View
 from nonsmooth.plot import palette
 from nonsmooth.plot.planes import classes_of, legend_of, names_of
 from nonsmooth.plot.style import COLORS
@@ -36,7 +36,7 @@ class CellImage(View):
         self._image = self.figure.source(
             name=f"{self.name} cells", image=[empty], more=[empty], x=[0.0], y=[0.0], dw=[1.0], dh=[1.0], stage=[""]
         )
-        self._legend: list[tuple[str, ...]] = []
+        self._legend: Legend = []
         self._mapper = LinearColorMapper(palette=["#FFFFFF"], low=-0.5, high=0.5, nan_color="rgba(0,0,0,0)")
         image = plot.image("image", "x", "y", "dw", "dh", source=self._image, color_mapper=self._mapper, level="image")
         self._places = {
@@ -79,7 +79,7 @@ class CellImage(View):
             "stage": [stage],
         }
 
-    def legend(self) -> list[tuple[str, ...]]:
+    def legend(self) -> Legend:
         """The classes that the picture has."""
         return self._legend if self.name in self.results else []
 
@@ -108,7 +108,7 @@ class Chart(CellImage):
         super().build()
         self._subject: dict[str, Any] = {}  # of which request the results are
 
-    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+    def show(self, job: Request, found: Results) -> None:
         """Exponents of another range are of no use."""
         subject = {key: value for key, value in job.items() if key != "view"}
         if subject != self._subject:
@@ -181,7 +181,7 @@ class Basins(CellImage):
         super().build()
         self._known: list[tuple[int, Any]] = []
 
-    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+    def show(self, job: Request, found: Results) -> None:
         """Attractors keep their colours from one picture to the next."""
         if (job["x"], job["y"]) == (self.state.x, self.state.y):
             self._stage = job["view"]

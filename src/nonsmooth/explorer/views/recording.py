@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from nonsmooth.explorer.figures import GREY, MOST
-from nonsmooth.explorer.views.view import Request, Requests, View
+from nonsmooth.explorer.views.view import Request, Requests, Results, View
 
 
 class RecordingOverlay(View):
@@ -48,7 +45,7 @@ class RecordingOverlay(View):
         self.ink(GREY, *self._rings)
         self._figures = figures
 
-    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+    def show(self, job: Request, found: Results) -> None:
         """Hand what was found to the bench, and draw the motion anew beside it."""
         self.sheet.bench.put(found)
         self._redraw_all()

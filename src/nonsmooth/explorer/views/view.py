@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 Request = dict[str, Any]
 Requests = Mapping[str, Request]
+Results = Mapping[str, Any]
+Legend = list[tuple[str, ...]]
 Ends = tuple[float, float]
 
 
@@ -104,7 +106,7 @@ class View:
     def build(self) -> None:
         """Make the figure."""
 
-    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+    def show(self, job: Request, found: Results) -> None:
         """Draw results, which the sheet has kept."""
         self.redraw()
 
@@ -125,7 +127,7 @@ class View:
         if self.figure is not None:
             self.figure.clear()
 
-    def legend(self) -> list[tuple[str, ...]]:
+    def legend(self) -> Legend:
         """Words and colours; a sign in place of a dot where a third text says so."""
         return []
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
-from nonsmooth.system.kinds import above
+from nonsmooth.system.kinds import Positive
 
 _TIME, _DISPLACEMENT = ("time", "s"), ("displacement", "m")
 _BINS = 9  # shown on either side of the peak
@@ -90,7 +90,7 @@ def grazing(one: Picture, finding: Any) -> None:
 
 
 @picture("x fitted time", _TIME, _DISPLACEMENT, margin=0, ratio=0.9)
-def multiple_shooting(one: Picture, finding: Any, *, seconds: Annotated[float, above(0)] = 6.0) -> None:
+def multiple_shooting(one: Picture, finding: Any, *, seconds: Positive = 6.0) -> None:
     """Draw a record with contact, the segments fitted to it, and their residuals.
 
     Parameters
