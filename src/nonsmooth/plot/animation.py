@@ -112,7 +112,7 @@ class Animation(Answering):
         with style.journal():
             self.figure = Figure(figsize=(width, plots + high + 0.1), dpi=pixels / width)
             FigureCanvasAgg(self.figure)
-            sizes: dict[str, Any] = {"height_ratios": [high, plots][not high :], "width_ratios": [1.0, 1.5]}
+            sizes: style.Properties = {"height_ratios": [high, plots][not high :], "width_ratios": [1.0, 1.5]}
             grid = self.figure.add_gridspec(1 + bool(high), 2, hspace=0.1, wspace=0.24, **sizes)
             grid.update(left=0.1, right=0.98, bottom=0.42 / (plots + high), top=0.98)
             plane, over = (self.figure.add_subplot(grid[-1, k]) for k in (0, 1))

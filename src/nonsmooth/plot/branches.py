@@ -99,7 +99,7 @@ def draw_branch(
     ordinates = ordinates_of(result, name, quantity)
     shade = color or style.COLORS["first"]
     for line, at in lines_of(result):
-        looks: dict[str, Any] = {"linewidth": width, "zorder": 3}
+        looks: style.Properties = {"linewidth": width, "zorder": 3}
         if behind and line == "-":
             looks = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5}
         for row in ordinates:
@@ -222,7 +222,7 @@ def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: Any = No
     x, y = (str(name) for name, values in result.coords.items() if values.dims == ("point",))
     shade, line, words = KINDS[str(result["kind"].values)]
     over_chart = any(isinstance(item, QuadMesh) for item in ax.collections)
-    looks: dict[str, Any] = {"path_effects": style.halo(1.8)} if over_chart else {}
+    looks: style.Properties = {"path_effects": style.halo(1.8)} if over_chart else {}
     looks |= {"color": color or style.COLORS[shade], "linewidth": 1.0, "zorder": 3}
     values, heights = result[x].values, result[y].values
     style.line(ax, values, heights, line, label=style.once(ax, words), **looks)
@@ -377,7 +377,7 @@ def controlled_branch(
         if result.sizes["special"]:
             heights, bars = amplitude[result["special_point"].values], 2 * result["special_value_uncertainty"].values
             at, color = result["special_value"].values, style.COLORS["second"]
-            looks: dict[str, Any] = {"mark": "D", "face": "none", "size": 6.5, "label": "fold", "zorder": 5}
+            looks: style.Properties = {"mark": "D", "face": "none", "size": 6.5, "label": "fold", "zorder": 5}
             style.points(ax, at, heights, xerr=bars, color=color, **looks)
         if theory is not None:
             ax.axis(ax.axis())  # those of what was measured

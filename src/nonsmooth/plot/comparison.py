@@ -117,7 +117,7 @@ def comparison_phase_portrait(
             curves = [np.append(curve, curve[0]) for curve in curves]
         ours = side == "theory"
         word, wide, line = ("theory", 1.2, "-") if ours else (measured_label(result), 0.6, (0, (4, 2)))
-        looks: dict[str, Any] = {"linewidth": wide, "linestyle": line} if closed else {"linewidth": 0.4}
+        looks: style.Properties = {"linewidth": wide, "linestyle": line} if closed else {"linewidth": 0.4}
         ax.plot(*curves, color=color, label=word, **looks)
         points = columns(one_phase(result), f"{side}_section", names)
         # Rings about the few points of a closed orbit; of an attractor a cloud, the measured points on it.
@@ -153,7 +153,7 @@ def comparison_section(
     style.cloud(ax, measured, 1.7, MEASURED, measured_label(result))
     if few:  # points that come round again: rings about the measured ones
         x_ring, y_ring = (column[:few] for column in theory)
-        looks: dict[str, Any] = {"color": THEORY, "markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.9}
+        looks: style.Properties = {"color": THEORY, "markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.9}
         ax.plot(x_ring, y_ring, "o", label="theory", **looks)
     else:
         style.cloud(ax, theory, 1.2, THEORY, "theory")
@@ -235,7 +235,7 @@ def _flips(ax: Axes, result: xr.Dataset) -> None:
     none = np.full(result.sizes.get("flip", 0), np.nan)
     keys = ("theory_flip", "measured_flip_read", "measured_flip", "measured_flip_error")
     found = (result[key].values if key in result else none for key in keys)
-    tick: dict[str, Any] = {"transform": top, "zorder": 6, "solid_capstyle": "butt"}
+    tick: style.Properties = {"transform": top, "zorder": 6, "solid_capstyle": "butt"}
     for expected, read, still, error in zip(*found, strict=True):
         for place, color, width, words in ((expected, THEORY, 2.0, "theory"), (read, MEASURED, 1.2, word)):
             if np.isfinite(place):
@@ -246,7 +246,7 @@ def _flips(ax: Axes, result: xr.Dataset) -> None:
                 arrow = {"arrowstyle": "->", "color": MEASURED, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3}
                 ax.annotate("", (still, 0.965), (read, 0.965), xycoords=top, zorder=5, arrowprops=arrow)
             label = style.once(ax, f"flip, {word}, delay taken out")
-            looks: dict[str, Any] = {"size": 3.5, "markeredgewidth": 0.8, "elinewidth": 0.8, "capsize": 1.5}
+            looks: style.Properties = {"size": 3.5, "markeredgewidth": 0.8, "elinewidth": 0.8, "capsize": 1.5}
             looks |= {"face": "white", "mark": "D", "transform": top, "zorder": 6}
             style.points(ax, [still], [0.965], xerr=[error], label=label, **looks)
 
@@ -290,7 +290,7 @@ def comparison_response(ax: Axes, result: xr.Dataset, *, digits: Annotated[int, 
 def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> list[Any]:
     """A mark at the foot for each jump: filled where measured, open where predicted, with the difference."""
     foot = ax.get_xaxis_transform()
-    names: dict[str, Any] = {"color": style.COLORS["muted"], "markersize": 3.5, "linestyle": "none"}
+    names: style.Properties = {"color": style.COLORS["muted"], "markersize": 3.5, "linestyle": "none"}
     for key, word, face in (("measured_jump", measured_label(result), None), ("theory_jump", "theory", "white")):
         if np.isfinite(result[key].values if key in result else np.nan).any():
             ax.plot([], [], "D", markerfacecolor=face, label=f"jump, {word}", **names)
@@ -301,7 +301,7 @@ def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> list[Any]:
         seen, expected = (float(result[name].values[row]) for name in ("measured_jump", "theory_jump"))
         for place, face in ((seen, color), (expected, "white")):
             if np.isfinite(place):
-                looks: dict[str, Any] = {"markersize": 3.5, "transform": foot, "clip_on": False, "zorder": 6}
+                looks: style.Properties = {"markersize": 3.5, "transform": foot, "clip_on": False, "zorder": 6}
                 ax.plot([place], [0.03], "D", color=color, markerfacecolor=face, **looks)
         if np.isfinite(seen) and np.isfinite(expected):
             number = f"{expected - seen:+.{digits}f}".replace("-", "\N{MINUS SIGN}")

@@ -169,7 +169,7 @@ def put(ax: Axes, parts: Iterable[Part]) -> list[Any]:
             made.append(ax.text(x, y, words, color=color, fontsize=size * style.small(ax), ha=ha, va=va))
             continue
         color, width, fill = looks
-        common: dict[str, Any] = {"linewidth": width, "clip_on": False, "zorder": 2}
+        common: style.Properties = {"linewidth": width, "clip_on": False, "zorder": 2}
         if fill:
             one: Any = Polygon(np.column_stack([x, y]), facecolor=fill, edgecolor=color, **common)
         else:

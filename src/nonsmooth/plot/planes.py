@@ -50,7 +50,7 @@ def _box(color: str, words: str = "") -> Any:
 
 _LONGEST = 46  # characters of a line above the axes or beside them
 #: A legend above the axes, in the middle.
-_ABOVE: dict[str, Any] = {"loc": "lower center", "columnspacing": 1.0}
+_ABOVE: style.Properties = {"loc": "lower center", "columnspacing": 1.0}
 
 
 @figure("chart", "contacts_per_period", ratio=0.8)
@@ -114,7 +114,7 @@ def chart(
         ax.legend(handles=there, title="period", handlelength=1.0, handleheight=1.0, **style.beside(1.0))
     else:
         table, extend = values.transpose(second, first).values.astype(float), "neither"
-        looks: dict[str, Any] = {"cmap": "cividis"}
+        looks: style.Properties = {"cmap": "cividis"}
         if show == "lyapunov":
             # beyond the 98th percentile a few periodic points of strong contraction would take all the colours
             finite = np.abs(table[np.isfinite(table)])
@@ -246,7 +246,7 @@ def basins(ax: Axes, result: xr.Dataset, *, size: Positive = 3.6) -> None:
         if (labels == fate).any():
             handles.append(_box(fates[fate + 2]))
             names.append(name)
-    looks: dict[str, Any] = {"title": "basins, with the section points of their attractors" if colors else None}
+    looks: style.Properties = {"title": "basins, with the section points of their attractors" if colors else None}
     looks |= {"handlelength": 1.4, "handleheight": 1.2, "handler_map": {tuple: HandlerTuple(ndivide=1)}}
     ax.legend(handles, names, bbox_to_anchor=(0.5, 1.0), ncols=min(len(handles), 3), **_ABOVE, **looks)
     name_plane(ax, result, first, second)
@@ -263,9 +263,9 @@ def told_apart(names: list[str]) -> list[str]:
     return [f"{name} ({next(letters[name], '...')})" if names.count(name) > 1 else name for name in names]
 
 
-def section_mark(result: xr.Dataset, k: int, size: float) -> dict[str, Any]:
+def section_mark(result: xr.Dataset, k: int, size: float) -> style.Properties:
     """Looks of an attractor's section points: a mark of its own, white with a black edge; small dots of a cloud."""
-    black: dict[str, Any] = {"marker": "o", "color": style.COLORS["section"], "markeredgewidth": 0, "zorder": 4}
+    black: style.Properties = {"marker": "o", "color": style.COLORS["section"], "markeredgewidth": 0, "zorder": 4}
     if int(result["period_number"][k]) > 0:
         own = {"marker": _MARKS[k % len(_MARKS)], "markersize": size, "markerfacecolor": "white"}
         return black | own | {"markeredgewidth": 0.7, "zorder": 5}
@@ -301,7 +301,7 @@ def basin_fractions(ax: Axes, result: xr.Dataset, *, y: Name | None = None) -> N
     values, fraction = result[parameter].values, result["fraction"].values
     names = told_apart([_along(result, k) for k in range(result.sizes["attractor"])])
     colors = [palette.attractor_color(k) for k in range(len(names))]
-    edge: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.3}
+    edge: style.Properties = {"edgecolor": "black", "linewidth": 0.3}
     ax.margins(x=0)
     if y is None:
         shares = [*fraction.T, (result["not_converged"] + result["diverged"]).values]

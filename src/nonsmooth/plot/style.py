@@ -9,7 +9,7 @@ get the whole style.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -42,11 +42,13 @@ COLORS = {
     "muted": "#7F7F7F",
 }
 
+#: Properties of what is drawn, as Matplotlib takes them.
+Properties = dict[str, Any]
 #: A legend above the axes, for pictures that fill theirs.
-ABOVE: Mapping[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+ABOVE: Properties = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
 
 
-def beside(height: float) -> dict[str, Any]:
+def beside(height: float) -> Properties:
     """Place of a legend to the right of the axes, its top at their top (1) or its foot at theirs (0)."""
     where = "upper left" if height else "lower left"
     return {"loc": where, "bbox_to_anchor": (1.01, height), "borderaxespad": 0.0}
@@ -359,7 +361,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
         target = target.with_name(f"{target.name}.{owner.canvas.get_default_filetype()}")
     if target.suffix[1:].lower() not in (known := owner.canvas.get_supported_filetypes()):
         raise ValueError(f"{target}: the ending is that of no format of figures; allowed: {', '.join(sorted(known))}")
-    metadata: dict[str, Any] | None = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(target.suffix)
+    metadata: Properties | None = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(target.suffix)
     with _in(_made.get(owner, "journal")), placed(target) as fresh:
         owner.savefig(fresh, metadata=metadata)
     return target

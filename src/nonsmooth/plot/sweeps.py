@@ -149,7 +149,7 @@ def one_branch(result: xr.Dataset, k: int) -> xr.Dataset:
     return one.assign(special_point=one["special_point"] - points[0])
 
 
-_LOOKS: dict[str, dict[str, Any]] = {
+_LOOKS: dict[str, style.Properties] = {
     "up": {"color": style.COLORS["first"], "linestyle": "-"},
     "down": {"color": style.COLORS["second"], "linestyle": "--"},
     "none": {"color": style.COLORS["section"], "linestyle": "none", "marker": ".", "markersize": 1.5},
@@ -370,7 +370,7 @@ def smoothing_report(
             ax.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5, label=label)
         lost |= set(eta[one["status"].values != 0].tolist())
     if lost:
-        looks: dict[str, Any] = {"color": style.COLORS["section"], "markersize": 4, "label": "no such orbit"}
+        looks: style.Properties = {"color": style.COLORS["section"], "markersize": 4, "label": "no such orbit"}
         ax.plot(sorted(lost), [_LOST] * len(lost), "x", transform=ax.get_xaxis_transform(), **looks)
     ax.set(xscale="log", yscale="log", xlabel=r"half width of the bands, $\eta$", ylabel=_QUANTITIES[y])
     ax.legend()

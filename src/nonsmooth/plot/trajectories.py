@@ -193,7 +193,7 @@ def orbit(ax: Axes, result: Any, *, x: Name | None = None, y: Name | None = None
     run = result.trajectory()
     names = first_states(run, x, y)
     phase_portrait(run, ax, x=names[0], y=names[1])
-    mark: dict[str, Any] = {"size": 3.4, "zorder": 5, "markeredgewidth": 0.7}
+    mark: style.Properties = {"size": 3.4, "zorder": 5, "markeredgewidth": 0.7}
     if run.sizes["crossing"]:
         sides = (columns(run, key, names) for key in ("u_before", "u_after"))
         style.mark(ax, np.concatenate([*sides], axis=1), "o", "crossing", **mark)

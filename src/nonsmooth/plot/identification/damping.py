@@ -196,7 +196,7 @@ def forced_responses(one: Picture, finding: Any, *, responses: Sequence[Any] = (
     frequency, height, unstable = one.values("frequency", "response", "unstable")
     for chosen, face, word in ((unstable == 0, MEASURED, one.word), (unstable != 0, "white", "unstable part")):
         if chosen.any():
-            looks: dict[str, Any] = {"markersize": 3.0, "markerfacecolor": face, "markeredgewidth": 0.4}
+            looks: style.Properties = {"markersize": 3.0, "markerfacecolor": face, "markeredgewidth": 0.4}
             one.line(frequency[chosen], height[chosen], word, "section", ".", zorder=3, **looks)
     for curve in responses:
         f, a, stable = (curve[name].values for name in ("frequency", "amplitude", "stable"))

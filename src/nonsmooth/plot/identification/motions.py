@@ -142,7 +142,7 @@ def toss(one: Picture, time: Any, centre: Any, lowest: Any, impacts: Any, *, uni
     single, at = one.values("single", "impact_time")
     for kind, color, line, word in _IMPACTS:
         for moment in at[single.astype(bool) == kind]:
-            looks: dict[str, Any] = {"color": style.COLORS[color], "linestyle": line, "linewidth": 0.8}
+            looks: style.Properties = {"color": style.COLORS[color], "linestyle": line, "linewidth": 0.8}
             one.ax.axvline(moment, ymax=0.72, label=style.once(one.ax, word), **looks)
     one.ax.set_ylim(top=1.45 * float(np.max(centre)))
 
@@ -168,7 +168,7 @@ def restitution(one: Picture, impacts: Any, *, unit: str = "m/s") -> None:
     one.x = f"speed of the corner before ({unit})", ""
     one.points("speed", "restitution", f"{len(e)} impacts of one corner")
     if len(e):
-        looks: dict[str, Any] = {"color": style.COLORS["first"]}
+        looks: style.Properties = {"color": style.COLORS["first"]}
         one.ax.axhline(np.median(e), label=f"median {np.median(e):.2f}", **looks)
         looks |= {"alpha": 0.15, "linewidth": 0, "zorder": 0}
         one.ax.axhspan(*np.quantile(e, [0.25, 0.75]), label="middle half", **looks)

@@ -91,14 +91,14 @@ class Picture:
 
     def __init__(self, ax: Axes, data: Any, x: tuple[str, str] | str, y: tuple[str, str] | str) -> None:
         self.ax, self.data, self.x, self.y = ax, data, x, y
-        self.left: list[tuple[Any, Any, Any, Any, dict[str, Any]]] = []
+        self.left: list[tuple[Any, Any, Any, Any, style.Properties]] = []
 
     @property
     def word(self) -> str:
         """Word for the measured side."""
         return measured_label(self.data)
 
-    def finish(self, margin: float, strip: str | None, place: dict[str, Any], columns: int) -> None:
+    def finish(self, margin: float, strip: str | None, place: style.Properties, columns: int) -> None:
         """Name the axes, draw the residuals and set the legend."""
         self.ax.margins(x=margin)
         x, y = (
@@ -158,7 +158,7 @@ class Picture:
     def note(self, x: float, y: float, *lines: str) -> None:
         """Words in the axes, at a place in their own units."""
         sides = "left" if x < 0.5 else "right" if x > 0.5 else "center", "top" if y > 0.5 else "bottom"
-        looks: dict[str, Any] = {"ha": sides[0], "va": "center" if y == 0.5 else sides[1]}
+        looks: style.Properties = {"ha": sides[0], "va": "center" if y == 0.5 else sides[1]}
         text, size = "\n".join(filter(None, lines)), style.small(self.ax)
         self.ax.text(x, y, text, transform=self.ax.transAxes, fontsize=size, **looks)
 
