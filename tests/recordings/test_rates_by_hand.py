@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.recordings.recording import examine, missing_runs
+from nonsmooth.recordings.recording import examine, missing_said
 from nonsmooth.recordings.signals.displacement import found_resolution, resolution
 
 
@@ -45,11 +45,12 @@ def test_runs_of_missing_values() -> None:
     """All of them, and where the longest run begins; of equal ones the first."""
     values = np.ones(20)
     values[[2, 3, 7, 8, 9, 19]] = np.nan
-    assert missing_runs(values) == (6, 7, 3)
+    said = "of 20 values are not finite numbers, the longest run of them 3 from t = 0.7 s on"
+    assert missing_said(values, 0.1 * np.arange(20)) == f"6 {said}"
     values[12:15] = np.inf
-    assert missing_runs(values) == (9, 7, 3)
-    assert missing_runs(np.ones(4)) == (0, 0, 0)
-    assert missing_runs(np.full(3, np.nan)) == (3, 0, 3)
+    assert missing_said(values, 0.1 * np.arange(20)) == f"9 {said}"
+    assert missing_said(np.ones(4), np.arange(4.0)) == ""
+    assert missing_said(np.full(3, np.nan), np.arange(3.0), "f", "").endswith("the longest run of them 3 from f = 0 on")
 
 
 def test_the_step_of_a_sensor_is_read_off_whole_multiples() -> None:

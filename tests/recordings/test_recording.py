@@ -15,7 +15,7 @@ import nonsmooth as ns
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings import RecordingWarning
 from nonsmooth.recordings.load import parse_recording
-from nonsmooth.recordings.recording import examine, missing_runs
+from nonsmooth.recordings.recording import examine
 from nonsmooth.results.provenance import read_provenance
 
 
@@ -133,11 +133,6 @@ def test_times_with_too_few_digits() -> None:
     recording = parse_recording(table(np.floor(np.arange(300) / 10) / 100), "x.csv")
     assert any("270 of 299 time steps are zero" in w for w in recording.warnings)
     assert recording.rates["Run #1/x"] == pytest.approx(299 / 0.29)
-
-
-def test_missing_runs() -> None:
-    assert missing_runs(np.array([1, np.nan, 2, np.inf, np.nan, np.nan])) == (4, 3, 3)
-    assert missing_runs(np.arange(3.0)) == (0, 0, 0)
 
 
 def test_datasets_that_are_no_sensor() -> None:

@@ -113,7 +113,7 @@ def test_nothing_is_left_out_silently(tmp_path: Path) -> None:
         (HEAD.replace("0.838", "nan") + ENTRY, ValueError, "must be finite"),
         (HEAD + ENTRY.replace("voltage", "volts"), ValueError, "run 1: `volts` is not a setting.*nearest: voltage"),
         (HEAD + ENTRY.replace("crank_length = 0.0165, ", ""), ValueError, "'response' must state crank_length"),
-        (HEAD + ENTRY.replace('"up"', '"sideways"'), ValueError, "direction = 'sideways' must be 'up' or 'down'"),
+        (HEAD + ENTRY.replace('"up"', '"sideways"'), ValueError, "direction = 'sideways'; allowed: 'up', 'down'"),
         (HEAD + ENTRY.replace("4,", '"4",'), TypeError, "voltage must be a real number, not '4'"),
         (HEAD + ENTRY.replace('run = "Run #1", ', ""), ValueError, "needs run = "),
         (HEAD + ENTRY.replace('= "response"\n', '= "rsponse"\n'), ValueError, "nearest: response"),

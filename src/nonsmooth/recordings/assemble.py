@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Trace
-from nonsmooth.recordings.recording import Recording, examine, missing_runs, mixed_units
+from nonsmooth.recordings.recording import Recording, examine, missing_said, mixed_units
 from nonsmooth.results.labels import labelled
 
 #: A sensor with fewer samples says next to nothing of a motion; below this a remark is made.
@@ -74,15 +74,8 @@ def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
         note(f"only {len(first.values)} samples; too short to identify anything from")
     variables: dict[str, Any] = {}
     for trace in group:
-        total, start, longest = missing_runs(trace.values)
-        if total:
-            at = f"{axis} = {trace.axis[start]:.9g} {trace.axis_unit}".rstrip()
-            reading.of(
-                trace.run,
-                trace.name,
-                f"{total} of {len(trace.values)} values are not finite numbers, "
-                f"the longest run of them {longest} from {at} on; they are kept as they are",
-            )
+        if said := missing_said(trace.values, trace.axis, axis, trace.axis_unit):
+            reading.of(trace.run, trace.name, f"{said}; they are kept as they are")
         name = _fit(trace.name or "channel", [*variables, axis])
         if name != trace.name and name != _clean(trace.name):
             sentence = f"the name stands there twice, or is the axis; this one is called {name!r}"

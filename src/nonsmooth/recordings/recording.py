@@ -65,14 +65,15 @@ def examine(time: FloatArray) -> Sampling:
     return Sampling(rate, regular, repeated, gaps, change)
 
 
-def missing_runs(values: FloatArray) -> tuple[int, int, int]:
-    """Number of values that are not finite, and the first index and length of the longest run of them."""
+def missing_said(values: FloatArray, along: FloatArray, axis: str = "t", unit: str = "s") -> str:
+    """Sentence on the values that are not finite, and where the longest run of them begins; empty where all are."""
     bad = ~np.isfinite(values)
-    total = int(np.count_nonzero(bad))
-    if total == 0:
-        return 0, 0, 0
+    if not bad.any():
+        return ""
     start, end = max(runs_of(bad), key=lambda run: run[1] - run[0])
-    return total, start, end - start
+    at = f"{axis} = {along[start]:.9g} {unit}".rstrip()
+    total = f"{np.count_nonzero(bad)} of {len(values)} values are not finite numbers"
+    return f"{total}, the longest run of them {end - start} from {at} on"
 
 
 def runs_of(mask: BoolArray) -> list[tuple[int, int]]:

@@ -14,13 +14,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from nonsmooth.errors import Answering, DataFileError, check_keys, unknown
 from nonsmooth.recordings.load import content_of, load_recording
 from nonsmooth.recordings.reading import Options
 from nonsmooth.recordings.recording import Recording, RecordingWarning
-from nonsmooth.system.kinds import real_number
+from nonsmooth.system.kinds import reader_of, real_number
 
 NOTEBOOK = "session.toml"
 
@@ -58,13 +58,13 @@ PROCEDURES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 
 #: What may be set in a run: the type, the unit, the meaning.
-SETTINGS: Mapping[str, tuple[type, str, str]] = MappingProxyType(
+SETTINGS: Mapping[str, tuple[Any, str, str]] = MappingProxyType(
     {
         "voltage": (float, "V", "motor voltage"),
         "crank_length": (float, "m", "length of the crank (at the beginning, where it changes)"),
         "crank_length_end": (float, "m", "length of the crank at the end of a slow rise"),
         "gap": (float, "m", "gap of the support as read at its screw"),
-        "direction": (str, "", "up or down: how the steps follow one another"),
+        "direction": (Literal["up", "down"], "", "up or down: how the steps follow one another"),
         "figure": (int, "", "number of the published figure whose setting this is"),
         "note": (str, "", "a remark"),
     }
@@ -143,15 +143,8 @@ def _run(given: Any, procedure: str, where: str) -> tuple[str, Mapping[str, Any]
         raise ValueError(f'{where}: needs run = "..." with the name of the run in the file')
     if missing := [key for key in PROCEDURES[procedure] if key not in table]:
         raise ValueError(f"{where}: a run of {procedure!r} must state {', '.join(missing)}")
-    for key, value in table.items():
-        kind = SETTINGS[key][0]
-        if kind is float:
-            table[key] = real_number(value, f"{where}: {key}")
-        elif not isinstance(value, kind) or isinstance(value, bool):
-            raise TypeError(f"{where}: {key} = {value!r} must be of type {kind.__name__}")
-    if table.get("direction", "up") not in ("up", "down"):
-        raise ValueError(f"{where}: direction = {table['direction']!r} must be 'up' or 'down'")
-    return name, MappingProxyType(table)
+    read = {key: reader_of(SETTINGS[key][0])(value, f"{where}: {key}") for key, value in table.items()}
+    return name, MappingProxyType(read)
 
 
 def table_of(value: Any, where: str, known: Iterable[str], kind: str = "a key") -> Mapping[str, Any]:

@@ -103,6 +103,6 @@ def test_a_single_jump_is_not_a_small_one() -> None:
     jump = {"jump_value": 5.0, "jump_step": 0.1, "jump_before": 1.0, "jump_after": 2.0}
     response = xr.Dataset({name: ("jump", [value]) for name, value in jump.items()})
     response["jump_direction"] = ("jump", ["up"])
-    assert main_jump(response, "up") == Interval(4.95, 5.05)
+    assert main_jump(response, "up")[:2] == (4.95, 5.05)
     assert small_jump(response, "up") is None
     assert main_jump(response, "down") is None

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.recording import Recording, RecordingWarning, examine, missing_runs
+from nonsmooth.recordings.recording import Recording, RecordingWarning, examine, missing_said
 
 
 def whose(x: Any, default: str = "the signal") -> str:
@@ -59,18 +59,13 @@ def signal(
         raise ValueError(
             f"{name}: time {t[i]:.9g} s {what} (sample {i + 1}); export more digits of the times, or cut there"
         )
-    total, start, longest = missing_runs(values)
-    if total:
-        sentence = (
-            f"{total} of {len(values)} values are not finite numbers, the longest run of them {longest} "
-            f"from t = {t[start]:.9g} s on"
-        )
+    if sentence := missing_said(values, t):
         if missing == "error":
             raise ValueError(
                 f"{name}: {sentence}; {purpose} needs all: cut the record there, or smooth it first, which bridges them"
             )
         warn(x, f"{sentence}; they are bridged, with errors that say so")
-    if (usable := len(values) - total) < least:
+    if (usable := np.count_nonzero(np.isfinite(values))) < least:
         raise ValueError(f"{name}: too short: {usable} usable samples, and {purpose} needs {least}; record longer")
     return t, values
 
@@ -146,12 +141,11 @@ def take(
     if array.size < samples:
         raise ValueError(f"{name}: {array.size} samples are too short to identify anything from; {samples} are needed")
     (axis,) = array.dims
-    along, (total, start, longest) = array[axis].values, missing_runs(np.asarray(array.values, float))
-    if total and missing == "error":
+    along = array[axis].values
+    if (said := missing_said(np.asarray(array.values, float), along, str(axis), "")) and missing == "error":
         raise ValueError(
-            f"{name}: {total} of {array.size} values are not finite numbers, the longest run of them {longest} from "
-            f"{axis} = {along[start]:.9g} on; cut the record there, leave this run out (of the notebook, where there "
-            "is one), or take(..., missing='keep') and smooth it, which bridges them"
+            f"{name}: {said}; cut the record there, leave this run out (of the notebook, where there is one), or "
+            "take(..., missing='keep') and smooth it, which bridges them"
         )
     if duration is not None and (length := along[-1] - along[0]) < duration:
         raise ValueError(f"{name}: lasts {length:.4g} s, needed are {duration:.4g} s: record longer")

@@ -15,13 +15,11 @@ import signal
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
-from nonsmooth.recordings import RecordingWarning
 from nonsmooth_savi2007.figures.figure import Figure, finish
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import Laboratory
@@ -86,69 +84,51 @@ class Measurement:
             raise RuntimeError(f"the measurement on the virtual rig failed; see {self.log}. It said last: {said[-1]}")
 
 
-def measure(folder: str, names: Sequence[str], quick: bool, full: bool = False) -> None:
+def measure(folder: str, names: Sequence[str], quick: bool, full: bool) -> None:
     """Measure figures of the rig, and write what they show.
 
     Identification comes first; what needs only its result is shared among processes, where the system can fork this
     one (which has no threads then).
     """
-    known = _known()
-    if wrong := sorted(set(names) - set(known)):
-        raise ValueError(f"{', '.join(wrong)}: not measured on the rig; that are {', '.join(sorted(known))}")
+    from nonsmooth_savi2007.study import figures_of_the_study
+
+    global _settings, _figures
     place = Path(folder)
-    laboratory = Laboratory(place / RIG, quick, {name for one in names for name in known[one].procedures})
-    global _settings
+    _figures = {figure.name: figure for figure in figures_of_the_study(full=True)}
+    laboratory = Laboratory(place / RIG, quick, {one for name in names for one in _figures[name].procedures})
     _settings = Settings(quick=quick, full=full, progress=False, laboratory=laboratory, folder=place)
-    begin, busy = time.perf_counter(), time.process_time()
-    with _noted() as notes:
-        n = len(laboratory.identified)  # kept there for all that follows
-    took = time.perf_counter() - begin
-    print(f"{n} parameters identified: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
+    with _timed("parameters identified"):
+        _ = laboratory.identified  # kept there for all that follows
     tasks = [[name for name in group if name in names] for group in _GROUPS]
     tasks += [[name] for name in names if not any(name in group for group in _GROUPS)]
     tasks = [task for task in tasks if task]
     workers = min(os.cpu_count() or 1, len(tasks))
     if workers < 2 or "fork" not in multiprocessing.get_all_start_methods():
-        rows = [_task(task) for task in tasks]
+        for task in tasks:
+            _task(task)
     else:
         with ProcessPoolExecutor(workers, multiprocessing.get_context("fork")) as pool:
-            rows = list(pool.map(_task, tasks))
-    for note in dict.fromkeys(note for row in (notes, *rows) for note in row):
-        print(f"note: {note}")
+            list(pool.map(_task, tasks))  # so that what goes wrong is raised
 
 
 #: Figures that use the same records, and the longest first.
 _GROUPS = (("fig10_rig",), ("fig09_rig",), ("fig13_rig", "fig14_rig"), ("fig11_rig",), ("fig12_rig",), ("fig17_rig",))
 _settings: Settings  # the forked processes have them, with all that was identified
+_figures: dict[str, Figure]
 
 
-def _known() -> dict[str, Figure]:
-    from nonsmooth_savi2007.study import figures_of_the_study
-
-    return {figure.name: figure for figure in figures_of_the_study() if figure.rig}
-
-
-def _task(names: Sequence[str]) -> list[str]:
-    """Measure figures one after the other; what there is to note."""
-    with _noted() as notes:
-        for name in names:
-            begin, busy = time.perf_counter(), time.process_time()
-            data = _known()[name].compute(_settings)
-            took = time.perf_counter() - begin
-            finish(name, data, took, _settings)
-            print(f"{name}: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
-    return notes
+def _task(names: Sequence[str]) -> None:
+    """Measure figures one after the other."""
+    for name in names:
+        begin = time.perf_counter()
+        with _timed(name):
+            data = _figures[name].compute(_settings)
+        finish(name, data, time.perf_counter() - begin, _settings)
 
 
 @contextmanager
-def _noted() -> Iterator[list[str]]:
-    """Warnings about recordings are kept for the log; others stay warnings."""
-    notes = list[str]()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield notes
-    for item in caught:
-        if issubclass(item.category, RecordingWarning):
-            notes.append(str(item.message))
-        else:
-            warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+def _timed(words: str) -> Iterator[None]:
+    """Say how long something took."""
+    begin, busy = time.perf_counter(), time.process_time()
+    yield
+    print(f"{words}: {time.perf_counter() - begin:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)

@@ -19,7 +19,7 @@ from nonsmooth import ParameterSet, Recording, __version__, compare
 from nonsmooth.models import discontinuous_support
 from nonsmooth.recordings import Session, load_session
 from nonsmooth.recordings.signals.displacement import found_resolution
-from nonsmooth_savi2007.comparison import GapOffset, gap_offset, session_measurement
+from nonsmooth_savi2007.comparison import gap_offset, session_measurement
 from nonsmooth_savi2007.identification.chain import identify
 from nonsmooth_savi2007.rig import IDENTIFICATION, VirtualRig
 from nonsmooth_savi2007.rig.notebook import write_session
@@ -115,18 +115,14 @@ class Laboratory:
         self, session: Session, procedure: str, runs: str | Sequence[str]
     ) -> tuple[xr.Dataset, dict[str, Any]]:
         """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
-        return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=self._gap_offset)
+        offset = gap_offset(self.identified, self.session)
+        return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=offset)
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""
         return compare(
             measured, discontinuous_support(), parameters=self.identified, settings=settings, draws=0, **options
         )
-
-    @cached_property
-    def _gap_offset(self) -> GapOffset:
-        """Gap less the screw's reading, from the records with contact, and its uncertainty."""
-        return gap_offset(self.identified, self.session)
 
 
 def as_result(dataset: xr.Dataset, what: str, verb: str = "rig", *, synthetic: bool = True) -> xr.Dataset:

@@ -33,10 +33,11 @@ def motion_word(number: int) -> str:
 
 
 class Interval(NamedTuple):
-    """Something that lies between two neighbouring points of a sweep."""
+    """Something that lies between two neighbouring points of a sweep; of a jump the ``size`` of its step."""
 
     low: float
     high: float
+    size: float = 0.0
 
     @property
     def value(self) -> float:
@@ -105,34 +106,27 @@ def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None
     return (values[at[0]], values[at[-1]]) if len(at) else None
 
 
-def _sized_jumps(response: xr.Dataset, direction: str) -> list[tuple[float, Interval]]:
-    """The jumps of an amplitude in one direction, computed or measured, at rising values: size and step of each."""
+def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
+    """The steps in which an amplitude, computed or measured, jumps in one direction, at rising values."""
     here = response["jump_direction"].values.astype(str) == direction
     if "jump_variable" in response:
         here &= response["jump_variable"].values.astype(str) == "x"
     columns = (response[f"jump_{name}"].values[here].tolist() for name in ("value", "step", "before", "after"))
-    rows = [
-        (abs(after - before), Interval(value - 0.5 * step, value + 0.5 * step))
+    return sorted(
+        Interval(value - 0.5 * step, value + 0.5 * step, abs(after - before))
         for value, step, before, after in zip(*columns, strict=True)
-    ]
-    return sorted(rows, key=lambda row: row[1].low)
-
-
-def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
-    """The steps in which the amplitude jumps in one direction, at rising values."""
-    return [step for _, step in _sized_jumps(response, direction)]
+    )
 
 
 def main_jump(response: xr.Dataset, direction: str) -> Interval | None:
     """The jump above resonance: that with the largest step in amplitude."""
-    found = _sized_jumps(response, direction)
-    return max(found, key=lambda row: row[0])[1] if found else None
+    return max(jumps(response, direction), key=lambda one: one.size, default=None)
 
 
 def small_jump(response: xr.Dataset, direction: str) -> Interval | None:
     """The smallest of several jumps."""
-    found = _sized_jumps(response, direction)
-    return min(found, key=lambda row: row[0])[1] if len(found) > 1 else None
+    found = jumps(response, direction)
+    return min(found, key=lambda one: one.size) if len(found) > 1 else None
 
 
 def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:

@@ -68,11 +68,6 @@ class GapReference(NamedTuple):
     direction: int = 1
     mark: float = 0.0
 
-    @property
-    def runs(self) -> int:
-        """Runs without the support behind it."""
-        return self.places.runs
-
     def mean(self, crank_length: float) -> tuple[float, float]:
         """The car's mean position (m) in the sensor's count, and its standard uncertainty."""
         return self.places.place(crank_length)
@@ -225,7 +220,13 @@ def session_measurement(
             f"{session.folder}: [apparatus] needs distance_per_turn, the travel per turn of the sensor's wheel"
         )
     shows = SHOWS[procedure] if len(chosen) == 1 or procedure == "response" else "sections"
-    length = _crank_length(chosen)
+    lengths = {item.settings["crank_length"] for item in chosen if "crank_length" in item.settings}
+    if len(lengths) > 1:
+        raise ValueError(
+            f"the runs have {len(lengths)} crank lengths ({', '.join(f'{a:g}' for a in sorted(lengths))} m): a "
+            "response, or a diagram, has one; name the runs"
+        )
+    length = lengths.pop() if lengths else 0.0
     if reference is None:
         reference = gap_reference(session, referred=referred, offset=gap_offset)
     # The crank of a rise grows, and the mean position moves with it: it is referred point by point.
@@ -299,13 +300,3 @@ def _chosen(session: Session, procedure: str, runs: str | Sequence[str] | None) 
     if SHOWS[procedure] == "diagram" and len(wanted) != 1:
         raise ValueError(f"{len(wanted)} runs of {procedure!r}: a slow rise is one run")
     return [item for item in found if item.run in wanted]
-
-
-def _crank_length(chosen: list[Any]) -> float:
-    lengths = {item.settings["crank_length"] for item in chosen if "crank_length" in item.settings}
-    if len(lengths) > 1:
-        raise ValueError(
-            f"the runs have {len(lengths)} crank lengths ({', '.join(f'{a:g}' for a in sorted(lengths))} m): a "
-            "response, or a diagram, has one; name the runs"
-        )
-    return lengths.pop() if lengths else 0.0

@@ -151,10 +151,6 @@ def _caption_13(data: Datasets) -> str:
     )
 
 
-def _measure_17(settings: Settings) -> Datasets:
-    return _compared(settings, "fig17", 17, 101 if settings.quick else 401)
-
-
 def _draw_17(canvas: Canvas, data: Datasets) -> None:
     for ax, state, letter in zip(canvas.subplots(1, 2), "xv", "ab", strict=True):
         comparison_diagram(_without_flips(data["compared"]), ax, y=state, size=2.6)
@@ -185,5 +181,13 @@ FIGURES = (
         _SIZE,
         rig=True,
     ),
-    Figure("fig17_rig", 17, "Sections over the forcing frequency", _measure_17, _draw_17, _caption_17, rig=True),
+    Figure(
+        "fig17_rig",
+        17,
+        "Sections over the forcing frequency",
+        lambda settings: _compared(settings, "fig17", 17, 101 if settings.quick else 401),
+        _draw_17,
+        _caption_17,
+        rig=True,
+    ),
 )

@@ -81,12 +81,6 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
     return at, np.sqrt(2) * abs(value) * own / abs(bend)
 
 
-def _between(time: FloatArray, x: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
-    """Frequencies between two (Hz), and the modulus of the sum of the samples there."""
-    lines = zoom_fft(x, [low, high], m=FINE, fs=(len(time) - 1) / (time[-1] - time[0]), endpoint=True)
-    return np.linspace(low, high, FINE), np.abs(lines)
-
-
 def natural_frequency(decay: DecayFit) -> Finding:
     r"""The undamped natural frequency by decay, with the DFT's peak, its grid and its interpolation beside it.
 
@@ -128,13 +122,14 @@ def natural_frequency(decay: DecayFit) -> Finding:
         "domain: the rest is dry friction's",
         *decay.notes,
     )
-    fine, between = _between(time, x, frequency[max(top - 12, 1)], frequency[top + 12])
+    ends = frequency[[max(top - 12, 1), top + 12]]
+    between = np.abs(zoom_fft(x, ends, m=FINE, fs=rate, endpoint=True)) / rate
     data = picture_data(
         [run],
         {
             "time": {"time": time, "x": x, "fitted": fitted},
             "frequency": {"frequency": frequency, "magnitude": magnitude},
-            "fine_frequency": {"fine_frequency": fine, "fine_magnitude": between / rate},
+            "fine_frequency": {"fine_frequency": np.linspace(ends[0], ends[1], FINE), "fine_magnitude": between},
         },
         grid_step=grid_step,
         grid_peak=frequency[top],

@@ -97,8 +97,8 @@ def _cranks(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
         if not rows or channels != ("Angle", "Turn"):
             continue
         ratio = np.array([0.5 * _travel(run) / _length(run) for run in rows])
-        long = [run.label for run, r in zip(rows, ratio, strict=True) if r < SMALLEST]
-        short = [run.label for run, r in zip(rows, ratio, strict=True) if r > LARGEST]
+        labels = np.array([run.label for run in rows])
+        long, short = labels[ratio < SMALLEST].tolist(), labels[ratio > LARGEST].tolist()
         if ratio.max() < SMALLEST or short:
             worst = rows[int(ratio.argmax())]
             yield (

@@ -15,7 +15,7 @@ Where the car rests and about which place it swings comes from one function, :fu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,8 +41,7 @@ class MeanShift(NamedTuple):
     Three places are told apart: where the sensor counts zero, where the springs balance (``rest``; a car with dry
     friction stops within F_C/2k of it, and a sensor is zeroed where the car happens to stand), and the mean position
     under the drive. ``covariance`` is that of (rest, alpha, beta), ``by_zero`` how they move with the place of rest
-    that the taps tell; number of ``runs``; ``side``: 1 where the motor pulls from the support's side, -1 from the
-    other, 0 where the runs do not tell; ``notes`` on what the runs say of the string.
+    that the taps tell; number of ``runs``; ``notes`` on what the runs say of the string.
     """
 
     rest: float
@@ -52,7 +51,6 @@ class MeanShift(NamedTuple):
     by_zero: FloatArray
     runs: int
     string_length: float | None = None
-    side: int = 0
     notes: tuple[str, ...] = ()
 
     def at(self, crank_length: float) -> tuple[float, float]:
@@ -65,8 +63,7 @@ class MeanShift(NamedTuple):
 
     def row(self, crank_length: float) -> FloatArray:
         """Derivatives of the shift in (rest, alpha, beta)."""
-        further = 3 * crank_length**2 / (16 * self.string_length**2) if self.string_length else 0.0
-        return np.array([0.0, crank_length**2 * (1 + further), crank_length])
+        return np.array([0.0, _square(crank_length, self.string_length), crank_length])
 
     def _of(self, row: FloatArray) -> tuple[float, float]:
         return float(row @ [self.rest, self.alpha, self.beta]), float(np.sqrt(row @ self.covariance @ row))
@@ -88,9 +85,8 @@ def mean_of_drive(crank_length: float, string_length: float, ripple: float = 0.0
 
     The car between two equal springs moves by half.
     """
-    a = crank_length
-    string = a**2 / (4 * string_length) * (1 + 3 * a**2 / (16 * string_length**2))
-    return string - 0.5 * a * ripple * np.cos(ripple_phase)
+    string = _square(crank_length, string_length) / (4 * string_length)
+    return string - 0.5 * crank_length * ripple * np.cos(ripple_phase)
 
 
 def mean_shift(
@@ -127,9 +123,7 @@ def mean_shift(
 
     def fitted(length: float | None, alpha: float, alpha_error: float) -> MeanShift:
         """Rest, alpha and beta by least squares; alpha is known beforehand to its error, beta to a ripple of 0.03."""
-        # of the string's term the next order too, 0.1 % at a = 39 mm and L = 0.5 m
-        further = 3 * seen.crank**2 / (16 * length**2) if length else np.zeros(len(seen))
-        matrix = np.column_stack([np.ones(len(seen)), seen.crank**2 * (1 + further), seen.crank])
+        matrix = np.column_stack([np.ones(len(seen)), _square(seen.crank, length), seen.crank])
         y = seen.mean + dry * seen.lean
         known = np.array([max(zero_error, 1e-9), alpha_error, 0.03 / 4]) ** -2.0
         spread = 1e-5
@@ -153,20 +147,26 @@ def mean_shift(
         return fitted(string_length, 0.0, size)._replace(notes=(note,))
     side, note = int(np.sign(free.alpha)), ""
     if not string_length:
-        return free._replace(side=side)
+        return free
     off = abs(free.alpha - side * size) / np.hypot(error, told)
     if off > _CLEAR:
         note = (
             f"the mean positions say a string of {1 / (8 * abs(free.alpha)):.3g} m, the notebook {string_length:.3g} "
             f"m ({off:.0f} uncertainties apart): string_length is not used. Measure it from crank to driven spring"
         )
-        return free._replace(side=side, notes=(note,))
+        return free._replace(notes=(note,))
     if side < 0:
         note = (
             "the motor pulls from the side away from the support: its string moves the mean position away from the "
             "support"
         )
-    return fitted(string_length, side * size, told)._replace(side=side, notes=(note,) if note else ())
+    return fitted(string_length, side * size, told)._replace(notes=(note,) if note else ())
+
+
+def _square(crank_length: Any, string_length: float | None) -> Any:
+    """Square of the crank's length, with the next order of the string's term: 0.1 % at a = 39 mm and L = 0.5 m."""
+    square = crank_length**2
+    return square * (1 + 3 * square / (16 * string_length**2)) if string_length else square
 
 
 _MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be

@@ -44,8 +44,8 @@ def stiffness(
     Parameters
     ----------
     runs : sequence of Run
-        Each with ``x`` and ``force`` over the same times. The variance of a count's length :math:`\delta`,
-        :math:`\delta^2 / 12`, is projected by the slope.
+        Each with ``x`` and ``force`` over the same times. All samples weigh the same: a count of the position stands
+        for the same force everywhere.
     mass : float
         Mass that the hand accelerates (kg); 0 for a massless spring.
     gain_limit : float
@@ -72,12 +72,8 @@ def stiffness(
     if np.ptp(terms[:, 0]) < 50 * resolution:
         raise ValueError(f"{name}: the displacement changes by less than 50 counts in all runs; pull farther")
     columns = np.hstack([terms, block_diag(*(np.ones((n, 1)) for n in lengths))])  # an intercept for each run
-    values, covariance, left = _linear_law(columns, force, np.ones(len(force)), lengths)
-    for _ in range(3):
-        # the force's own variance is what its residuals leave after the count's, projected by the slope
-        projected = values[0] ** 2 * resolution**2 / 12
-        noise = max(np.var(left) - projected, 0.1 * np.var(left))
-        values, covariance, left = _linear_law(columns, force, np.full(len(force), noise + projected), lengths)
+    values = np.asarray(np.linalg.lstsq(columns, force, rcond=None)[0])
+    covariance = correlated(columns, force - columns @ values, lengths)
     errors = np.sqrt(np.diag(covariance))
     slope, error = values[0], errors[0]
     half = gain_limit * slope
@@ -113,7 +109,7 @@ def stiffness(
     return Finding(
         name,
         Estimate(slope, np.hypot(error, uniform(half)), "N/m", half_width=half),
-        "force against displacement, errors in both axes by effective variance, loop and inertia as terms (Fig. 4)",
+        "force against displacement, loop and inertia as terms, residuals correlated within each record (Fig. 4)",
         len(force),
         tuple(run.name for run in runs),
         tuple(notes),
@@ -121,19 +117,6 @@ def stiffness(
         data=data,
         plot="force_displacement",
     )
-
-
-def _linear_law(
-    columns: FloatArray, y: FloatArray, variance: FloatArray, pieces: Sequence[int]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Coefficients, their covariance and the residuals by weighted least squares; records have lengths ``pieces``.
-
-    Residuals are correlated within each record (J. Orear, Am. J. Phys. 50 (1982) 912, for errors in x).
-    """
-    weight = 1.0 / np.sqrt(variance)
-    values, *_ = np.linalg.lstsq(columns * weight[:, None], y * weight, rcond=None)
-    residuals = y - columns @ values
-    return np.asarray(values), correlated(columns * weight[:, None], residuals * weight, pieces), residuals
 
 
 def _columns(run: Run, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
