@@ -143,8 +143,10 @@ def _run(given: Any, procedure: str, where: str) -> tuple[str, Mapping[str, Any]
         raise ValueError(f'{where}: needs run = "..." with the name of the run in the file')
     if missing := [key for key in PROCEDURES[procedure] if key not in table]:
         raise ValueError(f"{where}: a run of {procedure!r} must state {', '.join(missing)}")
-    read = {key: reader_of(SETTINGS[key][0])(value, f"{where}: {key}") for key, value in table.items()}
-    return name, MappingProxyType(read)
+    for key, value in table.items():
+        kind, what = SETTINGS[key][0], f"{where}: {key}"
+        table[key] = real_number(value, what) if kind is float else reader_of(kind)(value, what)
+    return name, MappingProxyType(table)
 
 
 def table_of(value: Any, where: str, known: Iterable[str], kind: str = "a key") -> Mapping[str, Any]:
