@@ -89,25 +89,6 @@ def amplitudes() -> xr.Dataset:
     )
 
 
-def band() -> xr.Dataset:
-    omega = np.linspace(3, 6, 20)
-    height = 0.02 / np.sqrt((20.25 - omega**2) ** 2 + 1.08 * omega**2)
-    return xr.Dataset(
-        {
-            "omega": ("run", omega),
-            "amplitude": ("run", height),
-            "omega_low": 3.9,
-            "omega_high": 5.0,
-            "largest": height.max(),
-            "damping_ratio": 0.115,
-            "damping_ratio_error": 0.001,
-            "c": 0.87,
-            "c_error": 0.01,
-        },
-        attrs=SYNTHETIC,
-    )
-
-
 def circle() -> xr.Dataset:
     omega = np.linspace(3, 6, 40)
     response = 10 / (20.25 - omega**2 + 1.04j * omega)
@@ -304,7 +285,6 @@ PICTURES = {
     "multiple_shooting": shots,
     "profile": flat,
     "coverage": many,
-    "half_power": band,
     "nyquist": circle,
 }
 

@@ -6,7 +6,6 @@ from nonsmooth.plot.identification.damping import (
     drop_decay,
     forced_responses,
     free_decay,
-    half_power,
     modal_damping,
     nyquist,
 )
@@ -40,7 +39,6 @@ __all__ = [
     "forced_responses",
     "free_decay",
     "grazing",
-    "half_power",
     "impulse_history",
     "impulse_response",
     "modal_damping",

@@ -1,4 +1,4 @@
-"""Damping: fitted amplitudes, half-power bandwidth, complex responses, free decays, modes that depend on amplitude."""
+"""Damping: fitted amplitudes, complex responses, free decays, modes that depend on amplitude."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.comparison import MEASURED
-from nonsmooth.plot.identification.picture import Picture, number, picture
+from nonsmooth.plot.identification.picture import Picture, picture
 
 _TIME = ("time", "s")
 _OMEGA, _AMPLITUDE = (r"$\omega$", "rad/s"), ("amplitude of $x$", "m")
@@ -46,26 +46,6 @@ def amplitude_fit(one: Picture, finding: Any) -> None:
             left, error = error, None  # bars on the first residuals alone
             rest = heights - np.interp(omega, fine, curve)
             one.residual(omega, rest, f"residual, {word}", error=left, marker=mark, color=style.COLORS[color])
-    one.ax.set_ylim(bottom=0)
-
-
-@picture("omega amplitude omega_low omega_high largest", _OMEGA, _AMPLITUDE)
-def half_power(one: Picture, finding: Any) -> None:
-    """Draw amplitudes over frequency, the half-power level and the bandwidth.
-
-    Parameters
-    ----------
-    finding
-        A damping by half power, or its data: ``omega``, ``amplitude`` over ``run``; ``omega_low``, ``omega_high``,
-        ``largest``, ``damping_ratio``.
-    ax
-        Where to draw; a new one-column figure if None.
-    """
-    low, high, top = (number(one.data, name) for name in ("omega_low", "omega_high", "largest"))
-    one.span(low, high, f"bandwidth, {low:.3f} to {high:.3f} rad/s")
-    one.level(top / np.sqrt(2), r"largest amplitude$/\sqrt{2}$")
-    one.points("omega", "amplitude", face="white")
-    one.note(0.97, 0.95, one.text("damping_ratio", before=r"$\xi$ = "), one.text("c", "N s/m", before="$c$ = "))
     one.ax.set_ylim(bottom=0)
 
 

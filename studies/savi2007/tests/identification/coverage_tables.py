@@ -54,7 +54,6 @@ BESIDE: Mapping[str, tuple[str, str, str]] = {
     "c by complex response": ("c_frequency_response", "", "c"),
     "c by amplitude, with friction": ("c_response", "", "c"),
     "c by amplitude, viscous only (Fig. 6)": ("c_viscous_only", "", "c"),
-    "c by half-power bandwidth": ("c_half_power", "", "c"),
 }
 SHARE = 0.85  # of the truths must lie in their 95 % intervals: 34 of 40
 SPREAD = (0.5, 1.6)  # of the normalised errors' root mean square
@@ -195,8 +194,8 @@ def page(results: Sequence[Mapping[str, Any]], *, awkward: bool = False) -> str:
             )
     lines += [
         "",
-        "The last two take dry friction for damping: their intervals say how well an equivalent c is known, not the "
-        "damper's, and do not hold it. That is why no parameter rests on them.",
+        "The last one takes dry friction for damping: its interval says how well an equivalent c is known, not the "
+        "damper's, and does not hold it. That is why no parameter rests on it.",
     ]
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,4 @@
-"""Damping from steady runs: half power, amplitudes and the complex response against their closed forms."""
+"""Damping from steady runs: amplitudes and the complex response against their closed forms."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,6 @@ import pytest
 from studies.savi2007.tests.identification.made import COUNT, decay_of, run, swinging
 
 from nonsmooth.recordings.session import Quantity
-from nonsmooth_savi2007.identification.half_power import half_power, half_power_points
 from nonsmooth_savi2007.identification.response_fits import (
     amplitude_fit,
     grazing_amplitude,
@@ -20,28 +19,6 @@ from nonsmooth_savi2007.identification.steady import steady
 
 W, B, M = 4.5, 1.04, 0.84
 STEPS = W * np.array([0.55, 0.7, 0.8, 0.86, 0.9, 0.95, 1.0, 1.03, 1.07, 1.1, 1.14, 1.2, 1.3, 1.45, 1.7])
-
-
-def curve(omega, xi):
-    return 1 / np.sqrt((W**2 - omega**2) ** 2 + (2 * xi * W * omega) ** 2)
-
-
-@pytest.mark.parametrize("xi", [0.02, 0.115, 0.2])
-def test_half_power_frequencies_are_exact_for_a_linear_oscillator(xi):
-    omega = W * np.linspace(1 - 4 * xi if xi < 0.1 else 0.55, 1 + 4 * xi if xi < 0.1 else 1.7, 41)
-    low, high, top = half_power_points(omega, curve(omega, xi))
-    root = 2 * xi * np.sqrt(1 - xi**2)
-    assert low**2 == pytest.approx(W**2 * (1 - 2 * xi**2 - root), rel=1e-6)
-    assert high**2 == pytest.approx(W**2 * (1 - 2 * xi**2 + root), rel=1e-6)
-    assert top == pytest.approx(1 / (W**2 * root), rel=1e-6)
-
-
-def test_half_power_needs_both_sides():
-    omega = W * np.linspace(0.9, 1.0, 20)
-    with pytest.raises(ValueError, match="do not enclose both half-power frequencies: step over a wider range"):
-        half_power_points(omega, curve(omega, 0.115))
-    with pytest.raises(ValueError, match="8 are needed: step finer"):
-        half_power_points(omega[:5], curve(omega[:5], 0.115))
 
 
 def responding(f=0.0, cranks=(0.0165, 0.035), scale=1.0, mark=0.0, seed=0):
@@ -71,14 +48,6 @@ def test_the_complex_response_tells_all_five():
         assert abs(row.value - truth) < 3.5 * row.uncertainty
         assert row.uncertainty < 0.01 * max(abs(truth), 0.1)
     assert found.covariance.shape == (5, 5) and found.plot == "nyquist"
-
-
-def test_half_power_of_steady_runs_and_what_friction_does_to_it():
-    found = half_power(responding(), Quantity(M))
-    assert abs(found.value - M * B) < 3.5 * found.uncertainty < 0.02
-    assert abs(found.others["omega_0"].value - W) < 3.5 * found.others["omega_0"].uncertainty
-    rough = half_power(responding(0.012), Quantity(M))
-    assert rough.value > 1.01 * M * B and rough.others["c_16.5mm"].value > rough.value
 
 
 def test_at_one_frequency_the_viscous_bias_is_what_friction_takes_per_cycle():
@@ -135,13 +104,6 @@ def test_stated_uncertainties_are_neither_too_small_nor_too_large():
             rows.setdefault(name, []).append((one.value - truth) / one.uncertainty)
     spread = {name: np.sqrt(np.mean(np.square(z))) for name, z in rows.items()}
     assert all(0.2 < size < 2.0 for size in spread.values()), spread
-
-
-def test_half_powers_uncertainty_is_neither_too_small_nor_too_large():
-    found = [half_power(responding(seed=seed), Quantity(M)) for seed in range(6)]
-    for truth, rows in ((M * B, [one.estimate for one in found]), (W, [one.others["omega_0"] for one in found])):
-        z = [(row.value - truth) / row.uncertainty for row in rows]
-        assert 0.2 < np.sqrt(np.mean(np.square(z))) < 2.0
 
 
 def test_a_steady_run_is_its_closed_form():

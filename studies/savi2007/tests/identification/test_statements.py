@@ -125,7 +125,7 @@ def test_the_page_counts_what_it_was_given():
     rows[0]["rows"]["k"][3:] = [2.0, 3.0]
     inside = sum(r["rows"]["k"][3] <= 1.0 <= r["rows"]["k"][4] for r in rows)
     text = page(rows)
-    assert f"| k | {inside} of 40 |" in text and "All met." in text and "c by half-power bandwidth" in text
+    assert f"| k | {inside} of 40 |" in text and "All met." in text and "c by complex response" in text
     data = to_dataset(rows)
     assert data["estimate"].dims == ("rig", "parameter") and data.attrs["synthetic"] == "yes"
     assert float(data["low"].sel(parameter="k", rig=0)) == 2.0

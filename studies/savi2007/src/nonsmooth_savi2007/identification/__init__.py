@@ -10,7 +10,6 @@ from nonsmooth_savi2007.identification.decay_findings import decay_damping, natu
 from nonsmooth_savi2007.identification.evidence import gather
 from nonsmooth_savi2007.identification.free_decay import free_decay
 from nonsmooth_savi2007.identification.grazing import grazing_gap
-from nonsmooth_savi2007.identification.half_power import half_power
 from nonsmooth_savi2007.identification.multiple_shooting import shoot_contacts
 from nonsmooth_savi2007.identification.referral import mean_of_drive, mean_shift
 from nonsmooth_savi2007.identification.response_fits import amplitude_fit, receptance_fit, viscous_bias
@@ -25,7 +24,6 @@ __all__ = [
     "free_decay",
     "gather",
     "grazing_gap",
-    "half_power",
     "identify",
     "mean_of_drive",
     "mean_shift",

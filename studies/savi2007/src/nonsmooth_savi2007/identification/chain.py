@@ -23,7 +23,6 @@ from nonsmooth_savi2007.identification.decay_findings import decay_damping, natu
 from nonsmooth_savi2007.identification.evidence import Evidence, gather
 from nonsmooth_savi2007.identification.free_decay import DecayFit, free_decay
 from nonsmooth_savi2007.identification.grazing import grazing_gap
-from nonsmooth_savi2007.identification.half_power import half_power
 from nonsmooth_savi2007.identification.multiple_shooting import (
     ContactFit,
     contact_finding,
@@ -67,8 +66,8 @@ def identify(
     Each procedure gives what it can tell, and one adjustment joins them: the scale gives m, free decay
     :math:`\omega_0`, c/m and the dry friction, pulls and pushes 2k and k_s but for the force sensor's gain, the drop
     k_s/M and c_s/M, and records with contact k_s/m, c_s/m and the gap. What the paper does besides (Fig. 6, Fig. 8),
-    the half-power bandwidth, the complex response and the grazing frequency are findings beside it: they take dry
-    friction for damping, or tell less of the same.
+    the complex response and the grazing frequency are findings beside it: they take dry friction for damping, or tell
+    less of the same.
 
     Parameters
     ----------
@@ -259,8 +258,6 @@ class _Chain:
         if free and decay is not None:
             self.beside("damping by amplitude (Fig. 6)", lambda: amplitude_fit(seen, decay, self.mass))
             self.beside("complex frequency response", lambda: receptance_fit(seen, decay, self.mass))
-        if free:
-            self.beside("half-power bandwidth", lambda: half_power(seen, self.mass))
 
     def forces(self) -> None:
         for procedure, law, mass, friction in (
