@@ -14,7 +14,7 @@ import reference_values as known
 import nonsmooth as ns
 from nonsmooth import plot
 from nonsmooth_savi2007 import Reproduction
-from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
+from nonsmooth_savi2007.figures.branches import VARIED, branches, branches_of
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_17
 from nonsmooth_savi2007.report.pages import to_markdown
 from nonsmooth_savi2007.report.special import SpecialPoint, ratios, special_table, table_of_points
@@ -25,7 +25,7 @@ GRAZES = {"fig09": (FIGURE_9, 2), "fig10": (FIGURE_10, 2), "fig17": (FIGURE_17, 
 @pytest.fixture(scope="module")
 def data(quick: Reproduction) -> dict[str, dict]:
     """The branches of every figure that has them; the quick run has made some."""
-    return {figure: quick.data.get(figure) or branches(figure) for figure in BEGINNINGS}
+    return {figure: quick.data.get(figure) or branches(figure) for figure in VARIED}
 
 
 @pytest.fixture(scope="module")
@@ -79,11 +79,11 @@ def test_returns_are_the_section_points_of_the_orbit(data: dict[str, dict]) -> N
     """All period-n orbits close, and a stable one is what a simulation settles on."""
     for figure in data.values():
         for branch in branches_of(figure):
-            returns = branch["returns"].transpose("point", "iterate", "state").values
+            returns = branch["returns"].transpose("point", "return", "state").values
             assert returns.shape[1] == int(branch["period_number"])
             assert np.isfinite(returns).all()
             assert np.array_equal(returns[:, 0], branch["section"].transpose("point", "state").values)
-    branch = data["fig13"]["branch_2"]
+    branch = next(one for one in branches_of(data["fig13"]) if int(one["period_number"]) == 2)
     at = int(np.flatnonzero(branch["stable"].values)[len(branch["point"]) // 4])
     system = ns.models.discontinuous_support(omega=11.15, rho=0.33, g=float(branch["g"][at]))
     orbit = branch["returns"].values[at]
@@ -105,13 +105,13 @@ def test_the_unstable_branch_is_in_the_report(quick: Reproduction) -> None:
     assert "5.15984017 ... 5.81036893 rad/s: unstable throughout" in row.exact  # the folds, by heyoka
     text = (quick.out / "report.md").read_text(encoding="utf-8")
     assert "## Special points" in text and "0.24044985 N" in text
-    assert {"fig09_branch.nc", "fig09_branch_2.nc", "fig11_branch_8.nc"} <= {path.name for path in quick.out.iterdir()}
+    assert {"fig09_branches.nc", "fig11_branches.nc"} <= {path.name for path in quick.out.iterdir()}
 
 
 def test_branches_are_drawn_over_the_response(quick: Reproduction) -> None:
     import matplotlib.pyplot as plt
 
-    swept, branch = quick.data["fig09"]["exact"], quick.data["fig09"]["branch"]
+    swept, branch = quick.data["fig09"]["exact"], branches_of(quick.data["fig09"])[0]
     ax = plot.frequency_response(swept, branch, plt.figure().add_subplot())
     half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values
     unstable = next(line for line in ax.lines if line.get_label() == "unstable branch")
@@ -120,5 +120,5 @@ def test_branches_are_drawn_over_the_response(quick: Reproduction) -> None:
     assert line <= set(points)
     assert line >= {point for point, stable in zip(points, branch["stable"].values, strict=True) if not stable}
     with pytest.raises(ValueError, match=r"over 'omega', this branch over 'rho'"):
-        plot.frequency_response(swept, quick.data["fig11"]["branch"])
+        plot.frequency_response(swept, branches_of(quick.data["fig11"])[0])
     plt.close("all")

@@ -89,14 +89,11 @@ def _swept(values: list[float], period: list[int], status: list[int]) -> xr.Data
     )
 
 
-def test_separation_rate_of_a_map_that_doubles_distances() -> None:
-    returns, pairs = 8, 5
-    base = np.random.default_rng(0).normal(size=(pairs, returns, 2))
-    away = 1e-9 * 2.0 ** np.arange(returns)[None, :, None] * np.array([1.0, 0.0])
-    twins = xr.Dataset({"section": (("start", "iterate", "state"), np.concatenate([base, base + away]))})
-    rate, error = separation_rate(twins)
-    assert rate == pytest.approx(np.log(2), abs=1e-6)
-    assert error == pytest.approx(0, abs=1e-6)
+def test_the_separation_rate_is_the_largest_exponent_times_the_period() -> None:
+    """The exponent 0.7 of a drive of frequency 4 pi: distances grow by exp(0.35) in its period of 0.5."""
+    numbers = {"exponents": ("exponent", [0.7, -1.0]), "standard_error": ("exponent", [0.02, 0.03])}
+    found = xr.Dataset(numbers, {"omega": 4 * np.pi})
+    assert separation_rate(found) == pytest.approx((0.35, 0.01))
 
 
 def test_a_single_jump_is_not_a_small_one() -> None:

@@ -17,6 +17,7 @@ from nonsmooth.identification.fit.steady import is_steady, of_table
 from nonsmooth.identification.measured_units import compare_units_of_readings, units_of
 from nonsmooth.identification.options import Comparing
 from nonsmooth.results.labels import labelled, labels_of
+from nonsmooth.results.schema import parameter_coords
 from nonsmooth.system.arguments import check_system, checked
 from nonsmooth.system.kinds import real_number
 from nonsmooth.system.system import System
@@ -262,24 +263,20 @@ def _dataset(
         with_short_record,
     )
 
-    theory = model.theory
+    theory, units = model.theory, units_of(model.theory)
+    coords: dict[str, Any] = {
+        "state": labelled("state", np.array(model.states), "state"),
+        "state_unit": labelled("state", np.array([units[name] for name in model.states]), "unit"),
+    }
     if model.system is None:
         record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": model.seed}
     else:
         labels = labels_of(model.system)
         method = str(given.get("method", "auto"))
         record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=model.seed)))
-        own = {name: labelled((), float(q.value or 0.0), name, q.unit) for name, q in labels.parameters.items()}
-        variables = own | variables
-    units = units_of(theory)
+        coords |= parameter_coords(labels)
     record["measured"] = {key: str(value) for key, value in measured.attrs.items() if key != ATTRIBUTE}
-    coords = {
-        "state": labelled("state", np.array(model.states), "state"),
-        "state_unit": labelled("state", np.array([units[name] for name in model.states]), "unit"),
-    }
-    parameter_names = set(getattr(theory, "parameters", ()))
-    named = {key for key, (dims, _, _) in variables.items() if dims == key or (not dims and key in parameter_names)}
-    coords |= {key: variables.pop(key) for key in sorted(named)}
+    coords |= {key: variables.pop(key) for key in sorted(variables) if variables[key][0] == key}
     data = {key: (dims, np.asarray(values), attrs) for key, (dims, values, attrs) in variables.items()}
     synthetic = str(measured.attrs.get("synthetic", "no"))
     attrs = {"comparison": kind, "synthetic": synthetic, "title": str(measured.attrs.get("title", ""))}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SystemDefinitionError, unknown
+from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.identification.finding import normal_draws
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.kinds import ends, real_number
@@ -139,8 +139,7 @@ def draw_systems(
 def check_parameter(name: str, system: System) -> None:
     """Refuse a name that is no parameter of the system."""
     if name not in system.parameters:
-        units = {key: item.unit for key, item in system.parameters.items()}
-        raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+        system.with_parameters({name: 0.0})  # raises with the names there are
 
 
 def quantiles(draws: Any, edges: Any) -> np.ndarray:

@@ -8,12 +8,14 @@ a decimal point, or by ``;`` with a decimal comma.
 
 from __future__ import annotations
 
+import itertools
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.fields import Field, FieldTable, split_unit, traces_of
-from nonsmooth.recordings.readers.text_table import Numerals, checked_header, decoded, read_cells, rows, sniffed
+from nonsmooth.recordings.readers.text_table import Numerals, Row, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Reading, names_of
 
 #: What computed files have behind a run's name: the only free text of the format.
@@ -34,8 +36,7 @@ def looks_like_capstone(data: bytes, reading: Reading) -> bool:
     if begin.startswith((b"\xff\xfe", b"\xfe\xff")):
         begin, end = begin[: len(begin) // 2 * 2], len(begin) // 2 * 2
     try:
-        delimiter = reading.delimiter or _delimiter(begin[:end], reading)
-        header = next(rows(decoded(begin[:end], reading), delimiter, reading), (1, []))[1]
+        header = next(_rows(begin[:end], reading)[1], (1, []))[1]
     except DataFileError:
         return False
     # Stripped first: on much white space at the end the expression would try every way to share it out.
@@ -48,9 +49,8 @@ def read(data: bytes, reading: Reading) -> None:
     """Read a Capstone CSV export."""
     if reading.says_axes:
         raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
-    delimiter = reading.delimiter or _delimiter(data, reading)
+    delimiter, table = _rows(data, reading)
     numerals = Numerals.of(delimiter, reading)
-    table = rows(decoded(data, reading), delimiter, reading)
     line, fields = next(table, (1, []))
     header = checked_header(fields, line, reading)
     times, channels = _layout(header, reading)
@@ -109,11 +109,11 @@ def _layout(header: list[str], reading: Reading) -> tuple[dict[int, tuple[str, s
     return times, channels
 
 
-def _delimiter(data: bytes, reading: Reading) -> str:
-    """``;`` if the first line holds one outside quotes, else ``,``."""
-    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-    text = data[: 1 << 20].decode("utf-16" if wide else "utf-8", errors="replace").split("\n", 1)[0]
-    found = sniffed(text)
-    if found == " " and "\t" not in text and text.strip('" \r\n'):
+def _rows(data: bytes, reading: Reading) -> tuple[str, Iterator[Row]]:
+    """The character between fields, as the first line tells it, and the rows."""
+    stream = decoded(data, reading)
+    first = stream.readline()
+    delimiter = reading.delimiter or sniffed(first)
+    if delimiter == " " and first.strip('" \r\n'):
         raise reading.error("line 1", "holds one field only; expected fields separated by ',' or ';'")
-    return found if found != " " else ","
+    return delimiter, rows(itertools.chain([first], stream), delimiter, reading)

@@ -15,13 +15,12 @@ Applications to Tracking and Navigation (2001), Sections 6.2 and 8.6.
 from __future__ import annotations
 
 from math import isfinite, log, sqrt
-from typing import Any
 
 from nonsmooth.kernels.compile.cache import inline, kernel
 
 
 @inline
-def fill_step(n: Any, h: Any, q: Any, F: Any, Q: Any) -> None:
+def fill_step(n, h, q, F, Q):
     """Transition matrix and noise covariance of a step h."""
     for i in range(n):
         for j in range(n):
@@ -44,7 +43,7 @@ def fill_step(n: Any, h: Any, q: Any, F: Any, Q: Any) -> None:
 
 
 @inline
-def predict(n: Any, F: Any, Q: Any, u: Any, P: Any, u_next: Any, P_next: Any, work: Any) -> None:
+def predict(n, F, Q, u, P, u_next, P_next, work):
     """u_next = F u and P_next = F P F^T + Q."""
     for i in range(n):
         total = 0.0
@@ -66,9 +65,7 @@ def predict(n: Any, F: Any, Q: Any, u: Any, P: Any, u_next: Any, P_next: Any, wo
 
 
 @inline
-def run_filter(
-    n: Any, step: Any, y: Any, r: Any, jump: Any, wide: Any, q: Any, u: Any, P: Any, work: Any, sums: Any
-) -> None:
+def run_filter(n, step, y, r, jump, wide, q, u, P, work, sums):
     F, Q, W = work[0], work[1], work[2]
     u_p, u_f, P_p, P_f = u[0], u[1], P[0], P[1]
     sums[0] = 0.0
@@ -111,9 +108,7 @@ def run_filter(
     "void(int64, float64[::1], float64[::1], float64[::1], int64[::1], float64[::1], float64[::1], "
     "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], float64[::1])"
 )
-def filter_nodes(
-    n: Any, step: Any, y: Any, r: Any, jump: Any, wide: Any, q: Any, u: Any, P: Any, work: Any, sums: Any
-) -> None:
+def filter_nodes(n, step, y, r, jump, wide, q, u, P, work, sums):
     """Predicted [0] and filtered [1] states and covariances of all nodes; ``sums`` becomes (sum e^2/S, sum log S)."""
     # A number of states that the compiler knows lets it write the loops out: a quarter of the time.
     if n == 4:
@@ -125,7 +120,7 @@ def filter_nodes(
 
 
 @kernel("void(int64, float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1])")
-def smooth_nodes(n: Any, step: Any, q: Any, u: Any, P: Any, work: Any) -> None:
+def smooth_nodes(n, step, q, u, P, work):
     """Turn the filtered states and covariances into smoothed ones, from the last node back."""
     u_p, u_f, P_p, P_f = u[0], u[1], P[0], P[1]
     F, Q, C, G, D = work[0], work[1], work[2], work[3], work[4]

@@ -142,14 +142,7 @@ def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
     return {r: (regime == r).sum() for r in np.unique(regime)}
 
 
-def separation_rate(twins: xr.Dataset) -> tuple[float, float]:
-    """Mean growth of ln(distance) per period between each start and its twin, with its standard error.
-
-    The first half of the starts and the second are pairs. A mean over a finite time, not a Lyapunov exponent: it
-    leaves out the first return, in which the distance turns into the growing direction.
-    """
-    points = twins["section"].transpose("start", "iterate", "state").values / [1e-3, 1e-2]
-    half = len(points) // 2
-    distance = np.linalg.norm(points[half:] - points[:half], axis=-1)
-    rates = np.log(distance[:, -1] / distance[:, 0]) / (distance.shape[1] - 1)
-    return rates.mean(), rates.std(ddof=1) / np.sqrt(half)
+def separation_rate(found: xr.Dataset) -> tuple[float, float]:
+    """Growth of ln(distance) of neighbours per period, with its standard error: the largest Lyapunov exponent."""
+    largest, period = found.isel(exponent=0), 2 * np.pi / float(found["omega"])
+    return float(largest["exponents"]) * period, float(largest["standard_error"]) * period

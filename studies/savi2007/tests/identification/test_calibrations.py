@@ -93,12 +93,12 @@ def test_a_run_of_less_than_two_turns_is_refused():
 
 def test_a_line_through_points_of_unequal_errors_is_the_closed_form():
     x, y, error = np.array([0.0, 1.0, 2.0, 4.0]), np.array([1.0, 0.9, 0.2, 0.0]), np.array([0.5, 1.0, 0.7, 2.0])
-    line, scatter = scattered_line(x, y, error)
+    line, covariance, scatter = scattered_line(x, y, error)
     weight = error**-2.0
     middle, height = np.average(x, weights=weight), np.average(y, weights=weight)
     spread = np.sum(weight * (x - middle) ** 2)
     slope = np.sum(weight * (x - middle) * (y - height)) / spread
     assert scatter == 0
-    assert (line.slope, line.intercept) == pytest.approx((slope, height - slope * middle))
+    assert line == pytest.approx((slope, height - slope * middle))
     own = [[1 / spread, -middle / spread], [-middle / spread, 1 / weight.sum() + middle**2 / spread]]
-    assert line.covariance == pytest.approx(np.array(own))
+    assert covariance == pytest.approx(np.array(own))

@@ -141,7 +141,7 @@ def c1(data: Data) -> Iterator[Statement]:
         both = [data[name][flow] for name in ("fig09", "fig10")]
         met = _jumps(both)
         periods = [n for n in np.unique(regimes(data["fig11"][flow], "up")[1]) if n > 0]
-        rate, error = separation_rate(data["fig15"][f"{flow}_twins"])
+        rate, error = separation_rate(data["fig15"][f"{flow}_exponents"])
         texts.append(
             f"{met} jumps in Figs. 9-10; periods {', '.join(map(str, periods))} in Fig. 11; neighbouring trajectories "
             f"separate by a factor exp({rate:.2f} ± {error:.2f}) per period in Fig. 15"

@@ -46,7 +46,7 @@ def f12(data: Data) -> Iterator[Statement]:
 def f18(data: Data) -> Iterator[Statement]:
     """Portraits at three frequencies."""
     met = all(period in periods_reached(data["fig18"]["exact"], omega) for omega, period in FIGURE_18.items())
-    rate, error = separation_rate(data["fig18"]["exact_twins"])
+    rate, error = separation_rate(data["fig18"]["exact_exponents"])
     why = "Neighbouring trajectories on the chaotic orbit separate by a factor "
     why += f"exp({rate:.2f} ± {error:.2f}) per period (exact)."
     yield _portraits(data, "fig18", FIGURE_18, "Fig. 18, caption", "orbits at omega = ", met, why)

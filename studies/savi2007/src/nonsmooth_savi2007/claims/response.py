@@ -22,6 +22,7 @@ from nonsmooth_savi2007.claims.verdicts import (
     of_both,
     printed_cell,
 )
+from nonsmooth_savi2007.figures.branches import branches_of
 from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.grazing import grazing_frequencies
 from nonsmooth_savi2007.measure import (
@@ -129,7 +130,7 @@ def f9c(data: Data) -> Iterator[Statement]:
             f"{100 * wide[-1]:.0f} % at least"
         )
     two = len(wide) == 2 and min(wide) > _FEWEST_APART
-    branch = data["fig09"]["branch"]
+    branch = branches_of(data["fig09"])[0]
     table = special_points(branch)
     folds = table["point"].values[table["kind"].values == "fold"]
     first, last = folds.min(), folds.max()

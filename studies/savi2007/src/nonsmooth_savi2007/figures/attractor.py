@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable
 
 from matplotlib.axes import Axes
 
-from nonsmooth import Stroboscopic, plot, poincare
+from nonsmooth import Stroboscopic, lyapunov, plot, poincare
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, two_rows
 from nonsmooth_savi2007.figures.motions import SIDES, motions
-from nonsmooth_savi2007.figures.portraits import twins
+from nonsmooth_savi2007.figures.portraits import EXPONENT_PERIODS
 from nonsmooth_savi2007.flows import FLOWS, Settings
 from nonsmooth_savi2007.printed import FIGURE_13
 
@@ -32,7 +32,7 @@ def _compute(settings: Settings) -> Datasets:
             data[f"{flow.key}_{key}"] = poincare(
                 system, section=Stroboscopic(phase), n=n, transient=300, **flow.options
             )
-        data[f"{flow.key}_twins"] = twins(flow, system, data[f"{flow.key}_0"])
+        data[f"{flow.key}_exponents"] = lyapunov(system, periods=EXPONENT_PERIODS, progress=False, **flow.options)
     return data
 
 

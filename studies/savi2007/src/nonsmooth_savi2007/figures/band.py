@@ -9,6 +9,7 @@ import json
 
 import numpy as np
 import xarray as xr
+from scipy.optimize import bisect
 
 from nonsmooth import System, plot, poincare, simulate
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
@@ -95,17 +96,14 @@ def _first_meeting(eta: float) -> float:
     """Frequency, from 5.1 to 5.3, at which the steady motion without contact first meets something within a period."""
     model = EXACT.system(**FIGURE_9)
     options = {"method": "rkf45", "rtol": FINE} if eta else EXACT.options
-    low, high = 5.1, 5.3  # contact at the first, none at the second
 
-    def meets(omega: float) -> bool:
+    def meets(omega: float) -> float:
         at = model.with_parameters(omega=omega)
         system = at.smoothed(eta) if eta else at
-        return simulate(system, periods=1, start=steady_state(at.values), samples=2, **options).sizes["crossing"] > 0
+        run = simulate(system, periods=1, start=steady_state(at.values), samples=2, **options)
+        return 0.5 - bool(run.sizes["crossing"])
 
-    while high - low > NARROW:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if meets(middle) else (low, middle)
-    return 0.5 * (low + high)
+    return bisect(meets, 5.1, 5.3, xtol=NARROW)  # contact at the first, none at the second
 
 
 def order_in_eta(errors: xr.Dataset, form: str) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_orbit, plot
-from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, rows_of
+from nonsmooth_savi2007.figures.branches import VARIED, branches, branches_of, rows_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import EXACT, Settings
 from nonsmooth_savi2007.measure import status_names
@@ -66,8 +66,8 @@ def _compute(settings: Settings, name: str) -> Datasets:
 def curves(plane: Plane) -> list[xr.Dataset]:
     """Curves through the folds, flips and grazing points of the figure's branches, each curve once."""
     found: list[xr.Dataset] = []
-    begin = BEGINNINGS[plane.figure]
-    lines = list(branches(plane.figure).values())
+    begin = VARIED[plane.figure]
+    lines = branches_of(branches(plane.figure))
     for period, value in plane.further.items():
         system = EXACT.system(**{**begin.parameters, begin.parameter: value})
         orbit = find_orbit(system, period_number=period, progress=False)

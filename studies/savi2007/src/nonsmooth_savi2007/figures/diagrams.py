@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 
 from nonsmooth import plot, sweep
 from nonsmooth.plot import annotate, prefixed, shared_legend
-from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches
+from nonsmooth_savi2007.figures.branches import VARIED, branches
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
 from nonsmooth_savi2007.figures.resonance import branches_to_draw, grazing_of, mark_grazing
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
@@ -43,7 +43,7 @@ def diagrams(
     ``steps``: of the exact and of the smoothed sweep; the starts are tried at a half or a quarter of them.
     ``also``: values to be among those swept. ``patience``: transient of the exact flow from the starts.
     """
-    begin, data = BEGINNINGS[figure], dict[str, xr.Dataset]()
+    begin, data = VARIED[figure], dict[str, xr.Dataset]()
 
     def grid(steps: int) -> np.ndarray:
         return np.unique(np.round([*np.linspace(*begin.range, steps + 1), *also], 9))
@@ -146,8 +146,8 @@ def how(data: Datasets) -> str:
             f"values, after {many.attrs['transient']} periods"
         )
     return (
-        "Branches in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1; where they "
-        "are stable, the swept points lie on them. Special points are marked on those of period 1 and 2. Section at "
+        "Branches in (a): orbits of periods up to 8 of the exact flow, continued; where they are stable, the swept "
+        "points lie on them. Special points are marked on those of period 1 and 2. Section at "
         f"phase 0. {'; '.join(words)}."
     )
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from nonsmooth import plot, sweep, system_of
 from nonsmooth.plot import COLORS, comparison_diagram, shared_legend
-from nonsmooth_savi2007.figures.branches import BEGINNINGS
+from nonsmooth_savi2007.figures.branches import VARIED
 from nonsmooth_savi2007.figures.diagrams import mark
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.figures.motions import diagram_of, motions, runs_of
@@ -23,7 +23,7 @@ def _rise(settings: Settings) -> Datasets:
     for duration in _SHORT if settings.quick else RISES:
         session = bench.record(f"fig11_{duration:g}_s", bench.rig.figure(11, duration=duration))
         measured, set_ = bench.measured(session, "rise", bench.with_support(session, "rise"))
-        values = np.linspace(*BEGINNINGS["fig11"].range, 121 if settings.quick else 301)
+        values = np.linspace(*VARIED["fig11"].range, 121 if settings.quick else 301)
         compared = bench.compare(measured, set_, parameter="rho", direction="up", values=values)
         data[f"{duration:g}"] = compared.assign_attrs(rise=f"{duration:g} s")
     return data
@@ -80,7 +80,7 @@ def flips_said(result: xr.Dataset, name: str) -> str:
 
 def _compared(settings: Settings, figure: str, number: int, n: int) -> Datasets:
     """The motions recorded for Fig. ``number`` as a diagram over the model's of ``n`` values, swept up and down."""
-    found, begin = motions(settings.bench, number), BEGINNINGS[figure]
+    found, begin = motions(settings.bench, number), VARIED[figure]
     measured, set_ = diagram_of(found, begin.parameter)
     values = np.linspace(*begin.range, n)
     result = settings.bench.compare(measured, set_, parameter=begin.parameter, direction="both", values=values)
@@ -99,7 +99,7 @@ def _measure_13(settings: Settings) -> Datasets:
     data["starts"] = sweep(
         system_of(data["compared"]),
         "g",
-        np.linspace(*BEGINNINGS["fig13"].range, points),
+        np.linspace(*VARIED["fig13"].range, points),
         direction=None,
         start=starts(count),
         transient=transient,

@@ -1,4 +1,4 @@
-"""Figures 12, 14 and 18: phase portraits, an orbit per value, exact above smoothed; neighbours on an attractor."""
+"""Figures 12, 14 and 18: phase portraits, an orbit per value, exact above smoothed; how neighbours separate."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from nonsmooth import System, plot, poincare, simulate, sweep
+from nonsmooth import lyapunov, plot, simulate, sweep
 from nonsmooth.plot import prefixed, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, two_rows
-from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
+from nonsmooth_savi2007.flows import FLOWS, Settings, starts
 from nonsmooth_savi2007.measure import APERIODIC, parameter_of, period_word, periods_reached
 from nonsmooth_savi2007.printed import (
     FIGURE_11,
@@ -142,35 +142,20 @@ def words_of(reached: Mapping[int, int]) -> str:
     return ", ".join(f"{period_word(p)} ({n})" for p, n in reached.items())
 
 
-PAIRS = 400
-RETURNS = 12
-APART = {"exact": 1e-9, "smoothed": 1e-6}  # m; above what rounding (exact) or rtol 1e-6 (smoothed) does by itself
-
-
-def twins(flow: Flow, system: System, attractor: xr.Dataset) -> xr.Dataset:
-    """Sections from points of an ``attractor`` (the first half of the starts) and from their twins (the second).
-
-    A twin begins 1e-9 m beside its point in x (1e-6 m for the smoothed switch).
-    """
-    points = attractor["section"].transpose("iterate", "state").values
-    chosen = points[np.linspace(0, len(points) - 1, PAIRS).astype(int)]
-    beside = chosen + np.array([APART[flow.key], 0.0])
-    options = flow.options if flow is EXACT else {**flow.options, "rtol": 1e-9}
-    return poincare(system, start=np.vstack([chosen, beside]).tolist(), n=RETURNS, **options)
-
-
+EXPONENT_PERIODS = 5000  # over which exponents are averaged
 _CHAOTIC = 9.55
 
 
 def _compute_18(settings: Settings, number: int) -> Datasets:
-    """The portraits, and twins on the chaotic orbit."""
+    """The portraits, and the exponents of the chaotic orbit."""
     data = _compute(settings, number)
     for flow in FLOWS:
         survey = data[flow.key]
         begin = starts(survey.sizes["start"])[chosen_start(survey, _CHAOTIC, APERIODIC)]
         system = flow.system(omega=_CHAOTIC, **FIGURE_17)
-        attractor = poincare(system, start=begin, transient=300, n=1000, **flow.options)
-        data[f"{flow.key}_twins"] = twins(flow, system, attractor)
+        data[f"{flow.key}_exponents"] = lyapunov(
+            system, start=begin, periods=EXPONENT_PERIODS, progress=False, **flow.options
+        )
     return data
 
 

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 
 from nonsmooth import frequency_response, plot
 from nonsmooth.plot import annotate, comparison_response, shared_legend
-from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
+from nonsmooth_savi2007.figures.branches import VARIED, branches, branches_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth_savi2007.grazing import grazing_frequencies
@@ -53,11 +53,11 @@ def branches_to_draw(data: Datasets) -> list[xr.Dataset]:
 
 
 def _compute(settings: Settings, name: str) -> Datasets:
-    data, (low, high) = {}, BEGINNINGS[name].range
+    data, (low, high) = {}, VARIED[name].range
     for flow in FLOWS:
         step = settings.of(flow, exact=0.0025, smoothed=0.005, quick=0.02)
         data[flow.key] = frequency_response(
-            flow.system(**BEGINNINGS[name].parameters),
+            flow.system(**VARIED[name].parameters),
             np.linspace(low, high, round((high - low) / step) + 1),
             transient=settings.of(flow, exact=300, smoothed=150, quick=60),
             keep=16,
@@ -119,7 +119,7 @@ def _caption(data: Datasets, printed: str) -> str:
     return (
         f"Frequency response for rho = {float(exact['rho']):g} N and g = {1e3 * float(exact['g']):g} mm: half the "
         "peak-to-peak displacement with rising and falling frequency; arrows: jumps, with their frequencies. "
-        "Branches in (a): periodic orbits of the exact flow, continued from one of them. "
+        "Branches in (a): periodic orbits of the exact flow, continued. "
         f"Closed-form grazing at {grazing} rad/s (green; in (b) of g - eta). Steps of "
         f"{fine:.4f} rad/s (exact) and {coarse:.4f} rad/s (smoothed; a shorter transient). {printed}"
     )

@@ -12,7 +12,6 @@ Both are straight lines with errors in both axes: what the notebook's voltages a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -26,37 +25,27 @@ from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.steady import harmonics_of
 
 
-class StraightLine(NamedTuple):
-    """y = intercept + slope x, the covariance (2, 2) of slope and intercept, and chi^2 per degree of freedom."""
-
-    slope: float
-    intercept: float
-    covariance: FloatArray
-    reduced: float
-
-
-def scattered_line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[StraightLine, float]:
+def scattered_line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """The weighted line through points that scatter more than their errors say: with the scatter they have in common.
 
-    Returns the line and that scatter, the standard deviation s in y which, added to every error, brings chi^2 to its
-    expectation; 0 where the errors do. Widening all errors by one factor instead would leave the weight with the points
-    whose own errors are smallest.
+    Returns slope and intercept, their covariance, and that scatter, the standard deviation s in y which, added to every
+    error, brings chi^2 to its expectation; 0 where the errors do. Widening all errors by one factor instead would leave
+    the weight with the points whose own errors are smallest.
 
     References: R.C. Paule and J. Mandel, J. Res. Natl. Bur. Stand. 87 (1982) 377.
     """
 
-    def fitted(s: float) -> StraightLine:
+    def fitted(s: float) -> tuple[FloatArray, FloatArray, float]:
         weight = 1.0 / np.hypot(error, s)
-        (slope, intercept), covariance = np.polyfit(x, y, 1, w=weight, cov="unscaled")
-        chi2 = np.sum((weight * (y - intercept - slope * x)) ** 2)
-        return StraightLine(slope, intercept, covariance, chi2 / max(len(x) - 2, 1))
+        line, covariance = np.polyfit(x, y, 1, w=weight, cov="unscaled")
+        return line, covariance, np.sum((weight * (y - np.polyval(line, x))) ** 2) / max(len(x) - 2, 1) - 1.0
 
-    line = fitted(0.0)
-    if len(y) < 3 or line.reduced <= 1:
-        return line, 0.0
+    line, covariance, excess = fitted(0.0)
+    if len(y) < 3 or excess <= 0:
+        return line, covariance, 0.0
     high = np.std(y - np.polyval(np.polyfit(x, y, 1), x)) * np.sqrt(len(y)) + error.max()
-    s = brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high)
-    return fitted(s), s
+    s = brentq(lambda s: fitted(s)[2], 0.0, high, xtol=1e-4 * high)
+    return *fitted(s)[:2], s
 
 
 def voltage_frequency(runs: Sequence[Run]) -> Finding:
@@ -82,14 +71,13 @@ def voltage_frequency(runs: Sequence[Run]) -> Finding:
     drives = [drive_phase(run.passages) for run in runs]
     omega = np.array([drive.omega for drive in drives])
     error = np.array([drive.omega_error for drive in drives])
-    line, scattered, data = _calibrated(
+    (slope, intercept), known, scattered, data = _calibrated(
         "voltages", runs, volts, omega, error, ("motor voltage", "V"), ("frequency", "rad/s")
     )
-    slope, intercept = line.slope, line.intercept
     offset = -intercept / slope
     # of slope, offset and intercept
     jacobian = np.array([[1.0, 0.0], [intercept / slope**2, -1 / slope], [0.0, 1.0]])
-    covariance = jacobian @ line.covariance @ jacobian.T
+    covariance = jacobian @ known @ jacobian.T
     errors = np.sqrt(np.diag(covariance))
     notes = [f"the motor turns from {offset:.3f} V on; omega = {slope:.5g} rad/(s V) x (V - {offset:.4g} V)"]
     return Finding(
@@ -136,28 +124,28 @@ def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | 
     for i, run in enumerate(runs):
         fitted, *_ = harmonics_of(run, run.force)
         force[i], error[i] = fitted.amplitudes[0], fitted.amplitude_errors[0]
-    line, scattered, data = _calibrated(
+    (slope, intercept), known, scattered, data = _calibrated(
         "crank lengths", runs, length, force, error, ("crank length", "m"), ("forcing amplitude", "N")
     )
-    type_a, half = np.sqrt(line.covariance[0, 0]), gain_limit * line.slope
+    (type_a, type_b), half = np.sqrt(np.diag(known)), gain_limit * slope
     total = np.hypot(type_a, uniform(half))
     notes = [
         f"type A {type_a:.2g} N/m; type B {uniform(half):.2g} N/m, the sensor's gain within ±{100 * gain_limit:g} %",
-        f"rho = 0.14 N is a crank of {1e3 * (0.14 - line.intercept) / line.slope:.2f} mm",
+        f"rho = 0.14 N is a crank of {1e3 * (0.14 - intercept) / slope:.2f} mm",
     ]
     if k is not None:
-        off = (line.slope - k.value) / np.hypot(total, k.uncertainty)
-        notes.append(f"k = {k} from elsewhere: {100 * (line.slope / k.value - 1):+.2f} %, {abs(off):.1f} uncertainties")
+        off = (slope - k.value) / np.hypot(total, k.uncertainty)
+        notes.append(f"k = {k} from elsewhere: {100 * (slope / k.value - 1):+.2f} %, {abs(off):.1f} uncertainties")
     return Finding(
         "crank_force",
-        Estimate(line.slope, total, "N/m", half_width=half),
+        Estimate(slope, total, "N/m", half_width=half),
         "straight line through the fundamentals of the force on the held car (Fig. 8b)",
         sum(run.force.size for run in runs),
         tuple(run.name for run in runs),
         (*notes, *scattered),
         {
-            "slope_a": Estimate(line.slope, type_a, "N/m"),
-            "intercept": Estimate(line.intercept, np.sqrt(line.covariance[1, 1]), "N"),
+            "slope_a": Estimate(slope, type_a, "N/m"),
+            "intercept": Estimate(intercept, type_b, "N"),
         },
         data=data,
         plot="calibration",
@@ -172,11 +160,11 @@ def _calibrated(
     error: FloatArray,
     named: tuple[str, str],
     read: tuple[str, str],
-) -> tuple[StraightLine, list[str], xr.Dataset]:
-    """The line through the points, a sentence where they scatter, and its picture: name and unit of both axes."""
+) -> tuple[FloatArray, FloatArray, list[str], xr.Dataset]:
+    """The line with its covariance, a sentence where points scatter, and its picture: name and unit of both axes."""
     if (n := len(np.unique(setting))) < 3:
         raise ValueError(f"a calibration needs runs at three different {settings} or more, got {n}")
-    line, scatter = scattered_line(setting, reading, error)
+    line, covariance, scatter = scattered_line(setting, reading, error)
     notes = []
     if scatter > 2 * np.median(error):
         notes.append(
@@ -185,8 +173,8 @@ def _calibrated(
         )
     fine = np.linspace(min(setting.min(), 0.0), setting.max(), 200)
     rows = np.column_stack([fine, np.ones_like(fine)])
-    reach = ndtri(0.975) * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
-    fitted, errors = line.intercept + line.slope * fine, np.sqrt(np.diag(line.covariance))
+    reach = ndtri(0.975) * np.sqrt(np.einsum("ij,jk,ik->i", rows, covariance, rows))
+    fitted, errors = rows @ line, np.sqrt(np.diag(covariance))
     unit, over = ({"units": units, "long_name": name} for name, units in (read, named))
     data = xr.Dataset(
         {
@@ -196,12 +184,12 @@ def _calibrated(
             "fitted": ("setting_fine", fitted, unit),
             "fitted_low": ("setting_fine", fitted - reach, unit),
             "fitted_high": ("setting_fine", fitted + reach, unit),
-            "slope": ((), line.slope),
+            "slope": ((), line[0]),
             "slope_error": ((), errors[0]),
-            "intercept": ((), line.intercept, unit),
+            "intercept": ((), line[1], unit),
             "intercept_error": ((), errors[1], unit),
         },
         {"setting_fine": ("setting_fine", fine, over)},
         {"synthetic": "yes" if any(run.synthetic for run in runs) else "no"},
     )
-    return line, notes, data
+    return line, covariance, notes, data

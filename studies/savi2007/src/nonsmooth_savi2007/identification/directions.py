@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import linregress
 
 if TYPE_CHECKING:
     from nonsmooth_savi2007.identification.evidence import Run
@@ -117,11 +118,10 @@ def _slope(run: Run) -> float:
     if run.x is None or run.force is None or run.x.size != run.force.size or run.x.size < 3:
         return 0.0
     x, force = run.positions, run.force.values
-    x, force = x - x.mean(), force - force.mean()
-    spread, common = x @ x, x @ force
-    if abs(common) <= _FOLLOWS * np.sqrt(spread * (force @ force)):
+    if np.ptp(x) == 0 or np.ptp(force) == 0:
         return 0.0
-    return common / spread
+    line = linregress(x, force)
+    return line.slope if abs(line.rvalue) > _FOLLOWS else 0.0
 
 
 def few(names: Sequence[str]) -> str:

@@ -34,7 +34,7 @@ from scipy.special import ndtri
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
+from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.cross_checks import inverse
 from nonsmooth_savi2007.identification.evidence import Run
@@ -152,14 +152,18 @@ def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate)
 
 def fit_contact(
     run: Run,
-    drive: DrivePhase,
-    wanders: bool,
     known: ParameterSet,
     first: Mapping[str, float],
     span: tuple[float, float],
+    coarse: bool = False,
     **options: Any,
 ) -> ParameterSet:
-    """Fit a run, or its part between two times (s), from first values; ``options`` of :func:`nonsmooth.fit`."""
+    """Fit a run, or its part between two times (s), from first values; ``options`` of :func:`nonsmooth.fit`.
+
+    ``coarse``: follow a crank that wanders by every other turn.
+    """
+    drive, wanders = drive_phase(run.passages), _wanders(run)
+    drive = drive.coarser if coarse else drive
     inside = (run.time >= span[0]) & (run.time <= span[1])
     recorded, set_to = {"x": (run.time[inside], run.positions[inside])}, {}
     if wanders:
@@ -210,27 +214,28 @@ def shoot_contacts(
     if not touched:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     for run in touched:
-        known, drive, span = known_before(run, decay, mark), drive_phase(run.passages), _span(run)
-        wanders, first = not drive.wander()[1], {"kappa": kappa, "gamma": gamma, **known}
+        known, span = known_before(run, decay, mark), _span(run)
+        first = {"kappa": kappa, "gamma": gamma, **known}
         try:
-            found = fit_contact(run, drive, wanders, known, first, span)
+            found = fit_contact(run, known, first, span)
             if _excess(found, decay) > _FAR:
-                found = fit_contact(run, drive, wanders, known, first, span, leave_out=True)
+                found = fit_contact(run, known, first, span, leave_out=True)
         except SolveError as reason:
             left.append(f"contact {run.name}: left out: {reason}")
             continue
         moved = np.zeros(len(SHARED) + len(OWN))
-        if wanders:
-            moved = _values(fit_contact(run, drive.coarser, wanders, known, found, span)) - _values(found)
+        if _wanders(run):
+            moved = _values(fit_contact(run, known, found, span, coarse=True)) - _values(found)
         rows.append((run, found, known, moved))
-    good = [row for row in rows if _excess(row[1], decay) <= _FAR]
+    sizes = [_excess(found, decay) for _, found, _, _ in rows]
+    good = [row for row, size in zip(rows, sizes, strict=True) if size <= _FAR]
     poor = 2 * len(good) <= len(touched)
     if not poor:
         left += [
-            f"contact {row[0].name}: left out: its residuals are {_excess(row[1], decay):.3g} times the sensor's "
-            "noise; look at its crank length, photogate and string"
-            for row in rows
-            if _excess(row[1], decay) > _FAR
+            f"contact {run.name}: left out: its residuals are {size:.3g} times the sensor's noise; look at its crank "
+            "length, photogate and string"
+            for (run, *_), size in zip(rows, sizes, strict=True)
+            if size > _FAR
         ]
         rows = good
     if not rows:
@@ -247,6 +252,10 @@ def shoot_contacts(
         tuple(left),
         poor,
     )
+
+
+def _wanders(run: Run) -> bool:
+    return not drive_phase(run.passages).wander()[1]
 
 
 def _touches(run: Run, rest: float) -> bool:
@@ -327,7 +336,7 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, kappa_error:
     (kappa, gamma), windows = found.values[3:5].tolist(), found.single()
     alone = []
     for i, first, last in windows[:: max(len(windows) // _TRIED, 1)]:
-        run, drive = found.runs[i], drive_phase(found.runs[i].passages)
+        run = found.runs[i]
         known = known_before(
             run,
             decay,
@@ -336,7 +345,7 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, kappa_error:
             gamma=Estimate(gamma, 10 * gamma),
         )
         try:
-            one = fit_contact(run, drive, not drive.wander()[1], known, known, (first, last), profile=["gamma"])
+            one = fit_contact(run, known, known, (first, last), profile=["gamma"])
         except SolveError:
             continue
         if np.isfinite(one.uncertainty["gamma"]):

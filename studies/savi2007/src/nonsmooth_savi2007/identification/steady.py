@@ -15,6 +15,7 @@ from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 
 HARMONICS = 3
+TURN = 36_000  # places of a turn: friction holds a car by a millimetre at most, so its side is known to 0.1 µm
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,7 @@ def steady(runs: Sequence[Run]) -> Steady:
         If a run lasts for less than two turns, or has no photogate.
     """
     rows: list[tuple[Any, ...]] = []
-    order, turn = np.arange(1, HARMONICS + 1), np.linspace(0, 2 * np.pi, 721)
+    order, turn = np.arange(1, HARMONICS + 1), np.linspace(0, 2 * np.pi, TURN, endpoint=False)
     for run in runs:
         fitted, omega, mark = harmonics_of(run, run.x)
         amplitude, shape = fitted.amplitudes[0], np.multiply.outer(turn, order) - fitted.phases
@@ -132,17 +133,8 @@ def steady(runs: Sequence[Run]) -> Steady:
                 fitted.mean_error,
                 fitted.mean + (np.cos(shape) @ fitted.amplitudes).max(),
                 fitted.residual,
-                _lean(-np.sin(shape) @ (order * fitted.amplitudes)),
+                np.sign(-np.sin(shape) @ (order * fitted.amplitudes)).mean(),
             )
         )
     columns = [np.array(column) for column in zip(*rows, strict=True)] or [np.zeros(0)] * (len(fields(Steady)) - 1)
     return Steady(tuple(runs), *columns)
-
-
-def _lean(v: FloatArray) -> float:
-    """Mean sign of a velocity over a turn, its zeros by interpolation."""
-    before, after = v[:-1], v[1:]
-    # the share of each step in which v is positive
-    step = np.where(before == after, 1.0, np.abs(after - before))
-    part = np.where(before * after < 0, np.maximum(before, after) / step, (before + after > 0).astype(float))
-    return 2 * part.mean() - 1

@@ -258,7 +258,7 @@ def _parameters(data: Data) -> Written:
 def _about_points(points: Sequence[SpecialPoint]) -> str:
     text = (
         "Every flip, fold and grazing point of the periodic orbits of Figs. 9, 10, 11, 13 and 17 (exact flow), along "
-        "the branches, which are continued from one stable orbit of each figure and switched at flips. The largest "
+        "the branches, which are continued from the periodic motions of sweeps and switched at flips. The largest "
         "multiplier is +1 at a fold and -1 at a flip; at a graze it is given without the contact and with a contact of "
         "no length. The motion without contact grazes where g = (rho/m) / sqrt((2k/m - omega^2)^2 + (c omega/m)^2), a "
         "closed form; of the others none is known."

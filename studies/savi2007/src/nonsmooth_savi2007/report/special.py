@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth_savi2007.claims.verdicts import Data
-from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches_of, rows_of
+from nonsmooth_savi2007.figures.branches import VARIED, branches_of, rows_of
 from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.report.pages import Written, table
 
@@ -36,7 +36,7 @@ def table_of_points(data: Data) -> list[SpecialPoint]:
     """All special points of the figures that are there, by figure and period; along their branches."""
     return [
         point
-        for figure in BEGINNINGS
+        for figure in VARIED
         if figure in data
         for branch in branches_of(data[figure])
         for point in _points(figure, branch)

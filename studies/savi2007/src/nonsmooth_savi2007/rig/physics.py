@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from nonsmooth import Mode, System, Transition, simulate
+from nonsmooth import Mode, System, Transition, mechanical, simulate
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.rig.truth import UNITS, published
 
@@ -83,16 +83,9 @@ def support_force(x: Any, v: Any, p: Any) -> Any:
 @cache
 def hanging_mass() -> System:
     """The support's spring with the test mass on it, about its equilibrium: M y'' + c_s y' + k_s y = 0."""
-
-    def field(t: Any, u: Any, p: Any) -> Any:
-        return u.v, -(p.k_s * u.x + p.c_s * u.v) / p.test_mass
-
-    return System(
-        name="support with test mass",
-        states={"x": "m", "v": "m/s"},
-        parameters={name: (published()[name], UNITS[name]) for name in ("k_s", "c_s", "test_mass")},
-        modes={"hanging": field},
-        scale={"x": 1e-3, "v": 1e-2},
+    known = {name: (published()[name], UNITS[name]) for name in ("k_s", "c_s", "test_mass")}
+    return mechanical(
+        "test_mass", "c_s", "k_s", coordinates={"x": "m"}, parameters=known, name="support with test mass"
     )
 
 
