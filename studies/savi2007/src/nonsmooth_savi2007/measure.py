@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate
-from nonsmooth_savi2007.arrays import FloatArray
 
 APERIODIC = 0  # no period found up to the longest looked for
 UNSETTLED = -1  # the transient did not decide it

@@ -25,8 +25,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, uniform
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.cross_checks import birge_ratio, inverse
 
 _ROUNDS = 50

@@ -18,9 +18,8 @@ import xarray as xr
 from scipy.optimize import brentq
 from scipy.special import ndtri
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
-from nonsmooth.recordings.signals.phase import drive_phase
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.steady import harmonics_of
 
@@ -68,7 +67,7 @@ def voltage_frequency(runs: Sequence[Run]) -> Finding:
         If there are fewer than three different voltages.
     """
     volts = np.array([run.settings["voltage"] for run in runs])
-    drives = [drive_phase(run.passages) for run in runs]
+    drives = [run.drive for run in runs]
     omega = np.array([drive.omega for drive in drives])
     error = np.array([drive.omega_error for drive in drives])
     (slope, intercept), known, scattered, data = _calibrated(

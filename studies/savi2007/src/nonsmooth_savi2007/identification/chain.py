@@ -15,7 +15,6 @@ from threadpoolctl import threadpool_limits
 from nonsmooth import ParameterSet, SolveError
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import RecordingWarning, Session
-from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth_savi2007.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth_savi2007.identification.cross_checks import cross_checks, sentences
@@ -226,7 +225,7 @@ class _Chain:
         """Say where the photogate sees the motor's frequency wander."""
         resolution = self.evidence.apparatus["turn_resolution"].value
         for procedure in ("response", "grazing", "contact"):
-            seen = [drive_phase(run.passages).wander(resolution) for run in self.runs[procedure]]
+            seen = [run.drive.wander(resolution) for run in self.runs[procedure]]
             if unsteady := [size for size, steady in seen if not steady]:
                 self.say(
                     f"{procedure}: the motor wanders in {len(unsteady)} of {len(seen)} runs, by "

@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as distribution
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import FloatArray
 
 #: Probability of a chi^2 this large by chance, below which measurements disagree.
 CHANCE = 1e-4

@@ -41,9 +41,9 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import zoom_fft
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import Decay, DecayFit, free_decay
 from nonsmooth_savi2007.identification.picture_data import picture_data
@@ -219,26 +219,24 @@ def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate,
     natural, b, f = decay.law
     which = max(range(len(peaks)), key=lambda i: np.ptp(decay.parts[i].x))
     part, (at, height, error) = decay.parts[which], peaks[which]
-    time = part.time
-    # the first turning point after the first fitted sample, and its height, to second order
-    first, v = decay.begins(which)
-    late = v / (natural**2 * first)
     slope, intercept, _ = decay_rate(at, height, error)
-    begun = time[0] + late
-    at = at - begun
-    fine = np.linspace(0.0, at[-1], 200)
+    begun, first = at[0], height[0]
+    fine = np.linspace(0.0, at[-1] - begun, 200)
     plain = np.exp(intercept + slope * (begun + fine))
-    both = envelope(fine, abs(first) * (1 + (natural * late) ** 2 / 2), natural, b, f)
     return picture_data(
         [part.run],
         {
-            "peak": {"peak_time": at, "peak_height": height, "peak_height_error": error},
+            "peak": {"peak_time": at - begun, "peak_height": height, "peak_height_error": error},
             "time": {
-                "time": time - time[0],
+                "time": part.time - begun,
                 "x": part.x - decay.rest,
                 "fitted": decay.fitted(which) - decay.rest,
             },
-            "fine_time": {"fine_time": fine, "envelope_both": both, "envelope_viscous": plain},
+            "fine_time": {
+                "fine_time": fine,
+                "envelope_both": envelope(fine, first, natural, b, f),
+                "envelope_viscous": plain,
+            },
         },
         c=c,
         friction_force=friction,

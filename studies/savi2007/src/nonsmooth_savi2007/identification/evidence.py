@@ -5,16 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from nonsmooth import Recording
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES, SETTINGS, Quantity, Session, load_session
 from nonsmooth.recordings.signals.checks import take
 from nonsmooth.recordings.signals.displacement import position
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
 from nonsmooth_savi2007.identification.directions import oriented
 
 #: Channels that a procedure cannot do without.
@@ -68,6 +70,11 @@ class Run:
         if self.turns is None:
             raise ValueError(f"{self.label}: has no channel 'Turn'; record the photogate with it")
         return self.turns
+
+    @cached_property
+    def drive(self) -> DrivePhase:
+        """The crank's angle over time."""
+        return drive_phase(self.passages)
 
     @property
     def gap(self) -> float:

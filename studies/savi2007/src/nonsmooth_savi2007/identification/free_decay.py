@@ -29,7 +29,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.identification.cross_checks import Consistent, consistent
 from nonsmooth_savi2007.identification.evidence import Run
 
@@ -110,11 +110,6 @@ class DecayFit(NamedTuple):
         """Fitted positions of one of the runs (m), in the sensor's count."""
         data = self.fit.residuals
         return data["fitted"].values[data["run"].values == which]
-
-    def begins(self, which: int) -> tuple[float, float]:
-        """Position from rest (m) and velocity (m/s) of one of the runs at its first sample."""
-        of = f", {which}" if len(self.parts) > 1 else ""
-        return self.fit.extra[f"x(0){of}"].value, self.fit.extra[f"v_x(0){of}"].value
 
 
 def swing(run: Run, slowest: float = SLOWEST) -> tuple[int, int]:

@@ -35,8 +35,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data

@@ -32,10 +32,9 @@ import xarray as xr
 from scipy.special import ndtri
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth.recordings.signals.phase import drive_phase
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.cross_checks import inverse
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
@@ -162,8 +161,7 @@ def fit_contact(
 
     ``coarse``: follow a crank that wanders by every other turn.
     """
-    drive, wanders = drive_phase(run.passages), _wanders(run)
-    drive = drive.coarser if coarse else drive
+    wanders, drive = not run.drive.wander()[1], run.drive.coarser if coarse else run.drive
     inside = (run.time >= span[0]) & (run.time <= span[1])
     recorded, set_to = {"x": (run.time[inside], run.positions[inside])}, {}
     if wanders:
@@ -224,7 +222,7 @@ def shoot_contacts(
             left.append(f"contact {run.name}: left out: {reason}")
             continue
         moved = np.zeros(len(SHARED) + len(OWN))
-        if _wanders(run):
+        if not run.drive.wander()[1]:
             moved = _values(fit_contact(run, known, found, span, coarse=True)) - _values(found)
         rows.append((run, found, known, moved))
     sizes = [_excess(found, decay) for _, found, _, _ in rows]
@@ -252,10 +250,6 @@ def shoot_contacts(
         tuple(left),
         poor,
     )
-
-
-def _wanders(run: Run) -> bool:
-    return not drive_phase(run.passages).wander()[1]
 
 
 def _touches(run: Run, rest: float) -> bool:

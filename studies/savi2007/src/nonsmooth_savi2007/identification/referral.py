@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted
 from nonsmooth_savi2007.identification.cross_checks import consistent, inverse
 from nonsmooth_savi2007.identification.evidence import Evidence

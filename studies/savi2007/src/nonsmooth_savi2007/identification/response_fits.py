@@ -28,9 +28,9 @@ import xarray as xr
 from scipy.optimize import least_squares
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady

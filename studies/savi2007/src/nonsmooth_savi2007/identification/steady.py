@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.recordings.signals.harmonics import HarmonicFit
 from nonsmooth.recordings.signals.harmonics import fit as harmonic_fit
-from nonsmooth.recordings.signals.phase import drive_phase
-from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 
 HARMONICS = 3
@@ -97,7 +96,7 @@ class Steady:
 def harmonics_of(run: Run, values: Any) -> tuple[HarmonicFit, float, float]:
     """Harmonics of a channel of a run over whole turns; the drive's frequency, and the time of phase 0."""
     time = values["time"].values
-    drive = drive_phase(run.passages)
+    drive = run.drive
     whole = int(np.floor((time[-1] - time[0]) / drive.period))
     if whole < 2:
         raise ValueError(

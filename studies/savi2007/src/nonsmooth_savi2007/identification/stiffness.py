@@ -22,9 +22,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, correlated, uniform
 from nonsmooth.recordings.signals.smoothing import savitzky_golay
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.picture_data import picture_data
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import Recording
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.physics import crank_angle, drive
 

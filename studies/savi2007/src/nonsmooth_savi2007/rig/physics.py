@@ -33,7 +33,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import Mode, System, Transition, mechanical, simulate
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.rig.truth import UNITS, published
 
 NO_SUPPORT = 10.0  # m: a gap that the car never closes

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings import RecordingWarning
-from nonsmooth_savi2007.arrays import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import Recording
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.arrays import FloatArray
 
 RECORD = np.dtype([("valid", "<u4"), ("value", "<f8")])  # of a member of a ``.cap``
 _PAGE = 256  # records; Capstone's members are longer than what was measured
