@@ -109,10 +109,9 @@ def _measured(measured: xr.Dataset, name: str, model: Model) -> tuple[FloatArray
     if name in section.dims:
         stacked = section.transpose(name, "iterate", "state").values
         numbers = [measured_period(one, model.noise, max_period=model.max_period).number for one in stacked]
-        at = np.repeat(measured[name].values.astype(float), stacked.shape[1])
-        points, found = stacked.reshape(-1, stacked.shape[2]), np.repeat(numbers, stacked.shape[1])
-        good = np.isfinite(points).all(axis=1)
-        return at[good], points[good], found[good]
+        good = np.isfinite(stacked).all(axis=2)
+        at, found = (np.repeat(one, good.sum(axis=1)) for one in (measured[name].values.astype(float), numbers))
+        return at, stacked[good], found
     points, at = section.transpose("iterate", "state").values, measured[name].values
     if at.shape != points.shape[:1]:
         raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")

@@ -70,6 +70,6 @@ class Settings:
         return exact if flow is EXACT else smoothed
 
 
-def starts(count: int, seed: int = 2007) -> list[Any]:
+def starts(count: int) -> list[Any]:
     """First states from a box a little larger than the motions of Figs. 11-18, so that coexisting motions show."""
-    return random_starts(count, {"x": -0.010, "v": -0.10}, {"x": 0.004, "v": 0.10}, seed=seed)
+    return random_starts(count, {"x": -0.010, "v": -0.10}, {"x": 0.004, "v": 0.10}, seed=2007)

@@ -15,9 +15,9 @@ from matplotlib.axes import Axes
 
 from nonsmooth import plot, sweep
 from nonsmooth.plot import annotate, prefixed, shared_legend
-from nonsmooth_savi2007.figures.branches import VARIED, branches
+from nonsmooth_savi2007.figures.branches import VARIED, branches, branches_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
-from nonsmooth_savi2007.figures.resonance import branches_to_draw, grazing_of, mark_grazing
+from nonsmooth_savi2007.figures.resonance import grazing_of, mark_grazing
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
 from nonsmooth_savi2007.measure import parameter_of
 from nonsmooth_savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_17, FIGURE_18, NUMBERS
@@ -87,7 +87,10 @@ def draw_diagram(ax: Axes, data: Datasets, key: str, y: str, figure: str) -> Non
         if chosen.any():
             plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, color=color, size=size)
             ax.get_lines()[-1].set(label=name, zorder=0.3)
-    lines = branches_to_draw(data) if key == EXACT.key else []
+    lines = [  # with special points on those of period 1 and 2
+        one if int(one["period_number"]) <= 2 else one.isel(special=slice(0, 0))
+        for one in (branches_of(data) if key == EXACT.key else ())
+    ]
     plot.bifurcation(swept, *lines, ax, y=y, size=0.9 if swept.sizes["iterate"] > 100 else 1.1, linewidth=1.0)
     mark(ax, figure)
 

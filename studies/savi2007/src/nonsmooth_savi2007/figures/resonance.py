@@ -47,11 +47,6 @@ def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
         )
 
 
-def branches_to_draw(data: Datasets) -> list[xr.Dataset]:
-    """The branches of a figure, special points on those of period 1 and 2 only."""
-    return [one if int(one["period_number"]) <= 2 else one.isel(special=slice(0, 0)) for one in branches_of(data)]
-
-
 def _compute(settings: Settings, name: str) -> Datasets:
     data, (low, high) = {}, VARIED[name].range
     for flow in FLOWS:

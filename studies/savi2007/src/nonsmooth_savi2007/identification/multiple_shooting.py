@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from scipy.linalg import block_diag
 from scipy.special import ndtri
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
@@ -142,10 +143,9 @@ def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate)
     covariance = np.diag([0.0, 0.0, 0.0, 1.5e-3, 1e-3, 5e-3 * crank, 0.05, 0.03 * crank, 0.03 * crank]) ** 2
     covariance[:3, :3] = decay.covariance[:3, :3] + 1e-12 * np.diag(np.diag(decay.covariance)[:3])
     rows = zip((*SHARED[:3], *OWN), values, np.sqrt(np.diag(covariance)), strict=True)
-    beside = np.diag([one.uncertainty**2 for one in also.values()])
     return ParameterSet(
         {name: Estimate(v, e) for name, v, e in rows} | also,
-        np.block([[covariance, np.zeros((9, len(also)))], [np.zeros((len(also), 9)), beside]]),
+        block_diag(covariance, *(one.uncertainty**2 for one in also.values())),
     )
 
 

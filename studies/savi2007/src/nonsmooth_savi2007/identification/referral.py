@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
@@ -342,9 +343,7 @@ def refer(
     # gap = counted - rest - shift, at rest = counted - rest, of counted and (rest, alpha, beta)
     rest = np.array([1.0, 0.0, 0.0])
     rows = np.array([[1.0, *(-rest - moved)], [1.0, *-rest], [0.0, *moved], [0.0, *rest]])
-    known = np.zeros((4, 4))
-    known[0, 0], known[1:, 1:] = counted.error**2, found.covariance
-    covariance = rows @ known @ rows.T
+    covariance = rows @ block_diag(counted.error**2, found.covariance) @ rows.T
     values = rows @ [counted.value, found.rest, found.alpha, found.beta]
     names = ("g", "gap_at_rest", "mean_shift", "rest_position")
     estimates = {
