@@ -154,8 +154,6 @@ class DelayedInputs:
         Instants at which an input changes.
     table : array (K, states)
         The states of all m inputs behind them.
-    own : array (K, m) of bool
-        Those that change there; the others go on.
     """
 
     def __init__(self, drive: Driven, delays: Sequence[float]) -> None:
@@ -165,7 +163,6 @@ class DelayedInputs:
         self.courses = [one.course(delay, width) for one, delay, width in given]
         self.times = np.unique(np.concatenate([t for t, _ in self.courses]))
         self.table = self.at(self.times)
-        self.own = np.stack([np.isin(self.times, t) for t, _ in self.courses], axis=1)
 
     def at(self, times: Any) -> FloatArray:
         """The states (..., n) of all inputs just behind some instants (...)."""
@@ -192,7 +189,7 @@ class DelayedInputs:
 
     def moved(self, flow: VariationalFlow, times: FloatArray) -> tuple[BoolArray, BoolArray]:
         """Does an active parameter move what changes at some times (K, n_active), and some of it only?"""
-        changed = self.own[np.searchsorted(self.times, times)][:, None]
+        changed = np.stack([t[np.searchsorted(t[:-1], times)] == times for t, _ in self.courses], axis=1)[:, None]
         mine = np.array([[delay == name for delay in self.delays] for name in flow.active], dtype=bool)
         mine = mine.reshape(flow.n_active, len(self.delays))
         moved = (changed & mine).any(axis=2)
