@@ -1,4 +1,6 @@
-"""Types of arrays."""
+"""Types of arrays, for annotations: ``FloatArray``, ``IntArray``, ``BoolArray`` and ``ComplexArray``, each NumPy's
+``NDArray`` of its numbers.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

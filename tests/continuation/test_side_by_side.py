@@ -69,6 +69,22 @@ def test_copies_that_change_their_modes_at_one_instant_have_no_corners() -> None
 
 
 @pytest.mark.physics
+def test_what_copies_do_at_one_instant_passes_the_section_together() -> None:
+    """Three corners were listed where a contact of two masses passes phase 0 of the forcing."""
+
+    def found(count: int) -> list[float]:
+        system = copies(count, s=lambda name: E.ElasticStop(at=name, position=0.4, stiffness=2.0, damping=0.05))
+        orbit = ns.find_orbit(system.with_parameters(w=0.6), start={f"q{i}": 0.05 for i in range(count)})
+        branch = ns.continue_orbit(orbit, "w", (0.6, 2.0), points=300)
+        assert branch["w"].values[[0, -1]] == pytest.approx([0.6, 2.0], abs=1e-12)
+        special = ns.special_points(branch)
+        assert special["kind"].values.tolist() == ["flip"]
+        return special["w"].values.tolist()
+
+    assert found(2) == pytest.approx(found(1), abs=1e-9)
+
+
+@pytest.mark.physics
 def test_copies_whose_impacts_turn_their_friction_have_the_multipliers_of_one() -> None:
     """The impact of the second was one with the first: its multipliers were -0.41 and 0.19 for -0.05 +- 0.15 i."""
 

@@ -22,7 +22,14 @@ from nonsmooth.plot.planes import basin_fractions, basins, chart
 from nonsmooth.plot.prefixes import prefixed
 from nonsmooth.plot.regions import regions
 from nonsmooth.plot.style import COLORS, COLUMN, PAGE, annotate, journal, save_figure, shared_legend, slides
-from nonsmooth.plot.sweeps import bifurcation, bifurcation_diagram, density, frequency_response, smoothing_report
+from nonsmooth.plot.sweeps import (
+    bifurcation,
+    bifurcation_diagram,
+    density,
+    frequency_response,
+    one_branch,
+    smoothing_report,
+)
 from nonsmooth.plot.trajectories import (
     amplitude_spectrum,
     orbit,
@@ -60,6 +67,7 @@ __all__ = [
     "mechanism",
     "multipliers",
     "name_plane",
+    "one_branch",
     "orbit",
     "phase_portrait",
     "prefixed",

@@ -141,7 +141,29 @@ def bifurcation_diagram(
 
 
 def one_branch(result: xr.Dataset, k: int) -> xr.Dataset:
-    """One of the branches, as ``draw_branch`` takes it."""
+    """One branch of a bifurcation diagram, as :func:`nonsmooth.plot.branch` draws it and with its special points.
+
+    Parameters
+    ----------
+    result : Dataset
+        Of :func:`nonsmooth.bifurcation_diagram`.
+    k : int
+        The branch, ``0 <= k < result.sizes["branch_id"]``.
+
+    Returns
+    -------
+    Dataset
+        Its points, its special points, and as many returns as its orbits have periods.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> oscillator = ns.models.impact_oscillator(A=0.1)
+    >>> diagram = ns.bifurcation_diagram(oscillator, "omega", (0.4, 0.5), progress=False)
+    >>> first = ns.plot.one_branch(diagram, 0)
+    >>> first.sizes["point"] == int((diagram["branch"] == 0).sum())
+    True
+    """
     points = np.flatnonzero(result["branch"].values == k)
     marks = np.flatnonzero(result["special_branch"].values == k)
     number = max(int(result["period_number"][k]), 1)

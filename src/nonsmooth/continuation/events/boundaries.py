@@ -17,8 +17,9 @@ from nonsmooth.continuation.events.change import (
     rest_after,
     without,
 )
-from nonsmooth.continuation.march.event import Event, Met, Step, first_beyond
+from nonsmooth.continuation.march.event import Event, Met, Step, first_beyond, locate
 from nonsmooth.continuation.problems.orbits import OrbitPoint
+from nonsmooth.continuation.problems.path import NOTHING
 from nonsmooth.continuation.problems.shooting import ON
 from nonsmooth.continuation.problems.visits import led
 
@@ -126,6 +127,12 @@ def _end(point: Any, visit: int) -> tuple[float, Any]:
 class Short(Crossed):
     """A visit shrinks to nothing."""
 
+    def located(self, step: Step) -> tuple[float, Any] | None:
+        """A visit that has no length as the step begins, between what two masses do at once, is none that vanishes."""
+        lasts = np.abs(step.a.path.tau) > NOTHING * step.a.period
+        lasts[[0, -1]] = True
+        return locate(step, lambda point: float(point.path.tau[lasts].min()))
+
     def at_section(self, point: Any) -> bool:
         """Return whether the visit begins or ends at the section of a forced orbit."""
         return point.shooting.forced and self.visit(point) in (0, point.shooting.m)
@@ -140,8 +147,10 @@ class Short(Crossed):
         return without(point, i - 1, 2) if slow else []
 
     def visit(self, point: Any) -> int:
-        """The visit itself."""
-        return int(point.path.tau.argmin())
+        """The visit itself; that at the section where others with which it passes there are as short."""
+        tau = point.path.tau
+        end = min((0, point.shooting.m), key=lambda i: float(tau[i]))
+        return end if tau[end] <= tau.min() + NOTHING * point.period else int(tau.argmin())
 
 
 class Slow(Crossed):

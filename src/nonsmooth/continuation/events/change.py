@@ -15,6 +15,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.path import NOTHING
 from nonsmooth.continuation.problems.shooting import Solved
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Visit
 from nonsmooth.continuation.problems.visits import anchored, led
@@ -145,8 +146,10 @@ def past_the_section(point: OrbitPoint) -> OrbitPoint | None:
     shooting, values = point.shooting, point.values
     once = point.once
     visits, times, end = once.signature.visits, once.times, once.period
-    at_once = [visit.row == AT_ONCE for visit in visits]  # all of one instant pass together
-    if int(point.path.tau.argmin()) == 0:
+    tau = point.path.tau
+    # All of one instant pass together.
+    at_once = [one.row == AT_ONCE or short for one, short in zip(visits, tau <= NOTHING * point.period, strict=True)]
+    if tau[0] <= tau[-1]:
         i = at_once.index(False, 1)
         z = led(shooting.flow, values, visits[i].mode, times[i - 1], -times[i - 1], once.states[i])
         moved = once.begun(i, 0.0, z)

@@ -34,6 +34,7 @@ STEEP = 1e-3  # of a tangent: its parameter
 ALONG = (1e-7, 1e-6, 1e-5)  # along the curve of a contact from the orbit where it has no speed
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
 EXACT = 1e-9  # of the orbit's size: orbits that meet are as near as this
+STEPS = (1e-8, 1e-7, 1e-6)  # along a branch, each way: one of them comes to the boundary beside which it was found
 JUMP = 1e-6  # of the orbit's size: as far it jumps where an impact becomes slow enough to be completed as rest
 ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same
 AGAIN = 3  # times that Newton's method is begun with one signature
@@ -59,7 +60,7 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
                 arrives = left <= SHRINKS * apart + EXACT or _shrink([*before, apart])
                 jumps = side == forward and left <= JUMP and _may_jump(point, found)
                 if (arrives or jumps) and not (_leads_back(point, found) or _came_by(point, found, passed)):
-                    found = found if side * found.rise >= 0.0 else found.turned()
+                    found = _leading_away(found, side, side != forward and left <= EXACT)
                     if arrives and (ahead is None or left < NEARER * ahead[0]):
                         return found
                     ahead = ahead or (left, found)
@@ -141,6 +142,19 @@ def _left(point: OrbitPoint, found: OrbitPoint) -> float:
     """Distance of an orbit from ``point`` as the parameter has all but come back to it."""
     nearer = found.curve.at_parameter(found.Y, point.value + NEARER * (found.value - point.value))
     return np.inf if nearer is None else _apart(point, nearer)
+
+
+def _leading_away(found: OrbitPoint, side: float, doubtful: bool) -> OrbitPoint:
+    """An orbit on one side of the parameter with the tangent that leads away from where it came from.
+
+    Back where the branch has come from, as near as a boundary is located, the side may be rounding: then it leads to
+    where orbits of the system are."""
+    found = found if side * found.rise >= 0.0 else found.turned()
+    for ds in STEPS if doubtful else ():
+        ahead, behind = (one.curve.step(one, ds) for one in (found, found.turned()))
+        if ahead is not None and behind is not None and ahead.virtual != behind.virtual:
+            return found.turned() if ahead.virtual else found
+    return found
 
 
 def _may_jump(*sides: OrbitPoint) -> bool:

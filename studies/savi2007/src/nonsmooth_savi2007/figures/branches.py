@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import bifurcation_diagram, special_points
-from nonsmooth.plot.sweeps import one_branch
+from nonsmooth.plot import one_branch
 from nonsmooth_savi2007.figures.figure import Datasets
 from nonsmooth_savi2007.flows import EXACT
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_11, FIGURE_13, FIGURE_17
