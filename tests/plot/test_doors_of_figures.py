@@ -46,7 +46,7 @@ def drawn() -> dict[str, tuple[Any, ...]]:
 def test_every_figure_of_a_result_has_a_door() -> None:
     """Those without: what is no figure of a result."""
     names = {name for room in ROOMS for name in room.__all__ if inspect.isfunction(getattr(room, name))}
-    others = {"annotate", "journal", "name_plane", "prefixed", "save_figure", "shade_zone"}
+    others = {"annotate", "journal", "name_plane", "one_branch", "prefixed", "save_figure", "shade_zone"}
     assert names - FIGURES.keys() == others | {"shared_legend", "slides"}
 
 
