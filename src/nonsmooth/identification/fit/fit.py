@@ -125,10 +125,9 @@ def fit(
         Coloured noise is weighted by its correlation from reading to reading, estimated with the rest, and the
         covariance takes what is left of the residuals' own correlation into account; a parameter that the recording
         does not determine, or bounds on one side only, has an infinite uncertainty and says so in
-        ``identifiability``. ``anomalies`` says where the
-        model fails. ``.residuals`` is a Dataset of the readings, the fit and the residuals over ``sample``, drawn by
-        ``ns.plot.identification.fit_residuals``; ``.steady`` the same for readings of steady states, drawn by
-        ``ns.plot.identification.steady_readings``.
+        ``identifiability``. ``anomalies`` says where the model fails. ``.residuals`` is a Dataset of the readings, the
+        fit and the residuals over ``sample``, drawn by ``ns.plot.identification.fit_residuals``; ``.steady`` the same
+        for readings of steady states, drawn by ``ns.plot.identification.steady_readings``.
 
     Raises
     ------

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
-from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, kept
+from nonsmooth.system.derived.assembly import Assembler, Pattern
+from nonsmooth.system.derived.calculus import Part, kept
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.derived.faces import INDEPENDENT
@@ -160,10 +160,10 @@ class Expressions(Assembler):
     def pushes(self, part: Part, draw: int = 0) -> FloatArray:
         return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))], draw)
 
-    def touched(self, part: Part) -> NDArray[np.bool_]:
+    def touched(self, part: Part) -> Any:
         return np.array([part.direction.get(i, 0) != 0 for i in range(len(self.u))])
 
-    def involved(self, expression: sp.Expr) -> NDArray[np.bool_]:
+    def involved(self, expression: sp.Expr) -> Any:
         return np.array([symbol in expression.free_symbols for symbol in self.u])
 
     def _numbers(self, expressions: Sequence[Any], draw: int) -> FloatArray:

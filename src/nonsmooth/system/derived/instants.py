@@ -19,7 +19,7 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.system.derived.assembly import kept
+from nonsmooth.system.derived.calculus import kept
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Assembler, Pattern

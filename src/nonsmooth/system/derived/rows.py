@@ -15,12 +15,12 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, SystemDefinitionError
 from nonsmooth.system.codegen.linear import put_together
-from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError, kept
+from nonsmooth.system.derived.assembly import Assembler, Pattern, VaryingError
+from nonsmooth.system.derived.calculus import Part, kept
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.hybrid.records import Form
@@ -235,13 +235,11 @@ class Rows(Assembler):
     def pushes(self, part: Part, draw: int = 0) -> FloatArray:
         return np.asarray(part.direction).real
 
-    def touched(self, part: Part) -> NDArray[np.bool_]:
-        found: NDArray[np.bool_] = part.direction != 0.0
-        return found
+    def touched(self, part: Part) -> Any:
+        return part.direction != 0.0
 
-    def involved(self, expression: Row) -> NDArray[np.bool_]:
-        found: NDArray[np.bool_] = expression.values[: self.n] != 0.0
-        return found
+    def involved(self, expression: Row) -> Any:
+        return expression.values[: self.n] != 0.0
 
     def vanishes(self, expression: Any) -> bool:
         return not (expression.values.real.any() if isinstance(expression, Row) else expression)

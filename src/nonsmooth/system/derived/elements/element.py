@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from nonsmooth.errors import SystemDefinitionError, shortened
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+    from nonsmooth.system.derived.assembly import Assembler, Pattern
+    from nonsmooth.system.derived.calculus import Part
 
 
 SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
