@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.continuation.events.of_orbits import NeimarkSacker
 
+pytestmark = pytest.mark.filterwarnings("ignore:multipliers of the orbit are equal:RuntimeWarning")
 E = ns.elements
 
 
@@ -106,6 +108,54 @@ def test_copies_whose_impacts_turn_their_friction_have_the_multipliers_of_one() 
     one, two = found(1), found(2)
     assert two.u == pytest.approx(np.repeat(one.u, 2), abs=1e-9)
     assert two.monodromy_matrix == pytest.approx(np.kron(one.monodromy_matrix, np.eye(2)), abs=1e-8)
+
+
+@pytest.mark.physics
+def test_where_copies_part_together_another_branch_crosses() -> None:
+    """Two multipliers that pass 1 together change no determinant's sign: it was missed. A warning comes before it."""
+
+    def clearance(count: int) -> ns.System:
+        names = [f"q{i}" for i in range(count)]
+        return ns.mechanical(
+            np.eye(count),
+            0.1 * np.eye(count),
+            np.zeros((count, count)),
+            parameters={"w": 0.8},
+            coordinates=names,
+            forcing={name: (lambda t, p: np.cos(p.w * t)) for name in names},
+            elements={
+                f"{key}{name}": E.ElasticStop(at=name, position=side, stiffness=1.0, side=side)
+                for name in names
+                for key, side in (("high", 1), ("low", -1))
+            },
+        )
+
+    def found(count: int) -> tuple[str, float]:
+        start = {f"{key}q{i}": value for i in range(count) for key, value in (("", 0.3), ("v_", 0.2))}
+        special = ns.special_points(ns.continue_orbit(ns.find_orbit(clearance(count), start=start), "w", (0.45, 0.9)))
+        ((kind,), (place,)) = special["kind"].values.tolist(), special["w"].values.tolist()
+        return kind, place
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert found(1) == ("pitchfork", pytest.approx(0.458871, abs=1e-6))
+    with pytest.warns(RuntimeWarning, match="parts of the system do the same"):
+        assert found(2) == ("branch_point", pytest.approx(found(1)[1], abs=1e-8))
+
+
+@pytest.mark.physics
+def test_a_fold_of_copies_is_a_fold() -> None:
+    """It was called transcritical too: the orbits in which only one copy turns back cross there."""
+
+    def found(count: int) -> list[tuple[str, float]]:
+        system = copies(count, s=lambda name: E.ElasticStop(at=name, position=0.4, stiffness=9.0, damping=0.05))
+        orbit = ns.find_orbit(system.with_parameters(w=0.6), start={f"q{i}": 0.05 for i in range(count)})
+        special = ns.special_points(ns.continue_orbit(orbit, "w", (0.55, 0.8), points=60))
+        return list(zip(special["kind"].values.tolist(), special["w"].values.tolist(), strict=True))
+
+    one = found(1)
+    assert "fold" in dict(one)
+    assert found(2) == [(kind, pytest.approx(place, abs=1e-8)) for kind, place in one]
 
 
 def test_pairs_that_leave_the_unit_circle_together_change_the_sign() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from nonsmooth.continuation.branches.other_branches import born, straight_on, sw
 from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.march.march import March, MarkedPoint
+from nonsmooth.continuation.problems.multipliers import copies
 from nonsmooth.errors import SolveError
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import Range, at_least
@@ -108,6 +110,14 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: MarchOptions) -> xr.Datas
         raise SolveError(
             "Newton's method did not converge at the orbit itself: give its parameter another value",
             status="no_convergence",
+        )
+    if copies(first.multipliers):
+        warnings.warn(
+            "multipliers of the orbit are equal: parts of the system do the same and do not feel each other. Where "
+            "they reach a boundary or part, all at once, corners may be listed that rounding makes, and the branch may "
+            "turn back: follow one of them alone",
+            RuntimeWarning,
+            stacklevel=4,
         )
     ahead = first.facing(1.0)
     middle = [record_of(MarkedPoint(ahead))]

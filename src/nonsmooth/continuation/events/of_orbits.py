@@ -15,6 +15,7 @@ neimark_sacker
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -123,13 +124,30 @@ class FoldOfOrbits(Fold):
 class BranchPointOfOrbits(BranchPoint):
     """Another branch of orbits crosses."""
 
+    def number(self, point: Any) -> float:
+        """The sign of the bordered determinant; of multipliers that stand more than once each counts once."""
+        product = _once(point)
+        return super().number(point) if product is None else float(np.sign(product * point.rise))
+
+    def vanishing(self, step: Step) -> Callable[[Any], float]:
+        """The bordered determinant, or the product over multipliers of which some stand more than once."""
+        return super().vanishing(step) if _once(step.a) is None else lambda point: float(_once(point) or np.nan)
+
     def named(self, step: Step, point: Any) -> Name:
         """The flip of the orbit of half the period, which ends the branch, or a crossing by its name."""
         if point.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the determinant's sign too
         if is_doubled(point):
             return "flip", "branching"
-        return super().named(step, point)
+        # Of several parts that part at once many branches cross: no two tangents tell of what kind it is.
+        return super().named(step, point) if _once(point) is None else (self.name, None)
+
+
+def _once(point: Any) -> float | None:
+    """The product of (mu - 1) over distinct multipliers; None where each stands once."""
+    mu = without_own(point.multipliers, point.shooting.forced)
+    once = distinct(mu)
+    return float(np.prod(np.array(once) - 1.0).real) if len(once) < len(mu) else None
 
 
 class Flip(Event):

@@ -144,6 +144,16 @@ class BranchPoint(Event):
         least, most = sorted(np.abs(both[:, -1]))
         return ("pitchfork" if least < TURNS * most else "transcritical"), None
 
+    def vanishing(self, step: Step) -> Callable[[Any], float]:
+        """The bordered determinant itself, as a part of that at the beginning of the step."""
+        reference = determinant(step.curve.bordered(step.a.solved, step.a.tangent))[1]
+
+        def number(point: Any) -> float:
+            sign, size = determinant(step.curve.bordered(point.solved, point.tangent))
+            return float(sign * np.exp(size - reference))
+
+        return number
+
     def confirmed(self, point: Any, was: float, now: float) -> bool:
         """Return True: its place solves equations of its own."""
         return True
@@ -151,13 +161,7 @@ class BranchPoint(Event):
     def located(self, step: Step) -> tuple[float, Any] | None:
         """The zero of the determinant itself, made exact by a system that is regular there."""
         curve, a, b = step.curve, step.a, step.b
-        reference = determinant(curve.bordered(a.solved, a.tangent))[1]
-
-        def number(point: Any) -> float:
-            sign, size = determinant(curve.bordered(point.solved, point.tangent))
-            return float(sign * np.exp(size - reference))
-
-        there = locate(step, number)
+        there = locate(step, self.vanishing(step))
         if there is None:
             return None
         point = there[1]

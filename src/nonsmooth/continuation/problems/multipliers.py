@@ -74,6 +74,12 @@ def distinct(mu: ComplexArray) -> list[complex]:
     return found
 
 
+def copies(mu: ComplexArray) -> bool:
+    """Return whether a multiplier other than zero stands more than once: parts of the system do the same, apart."""
+    moving = mu[np.abs(mu) > SAME]
+    return len(distinct(moving)) < len(moving)
+
+
 def product_of_pairs(mu: ComplexArray) -> float:
     r""":math:`\prod_{i<j} (\mu_i \mu_j - 1)`, zero where a pair reaches the unit circle; NaN where there is no pair."""
     return prod(a * b - 1.0 for a, b in combinations(mu.tolist(), 2)).real if len(mu) > 1 else np.nan
