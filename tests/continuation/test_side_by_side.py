@@ -158,6 +158,35 @@ def test_a_fold_of_copies_is_a_fold() -> None:
     assert found(2) == [(kind, pytest.approx(place, abs=1e-8)) for kind, place in one]
 
 
+@pytest.mark.physics
+def test_multipliers_that_hold_for_one_order_of_two_impacts_are_warned_of() -> None:
+    """Two equal masses that strike together: a spring between them leaves the order alone, a damper does not."""
+
+    def found(damping: float) -> tuple[ns.Orbit, float]:
+        between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        system = ns.mechanical(
+            np.eye(2),
+            0.16 * np.eye(2) + damping * between,
+            0.81 * np.eye(2) + 0.5 * between,
+            parameters={"w": 1.47},
+            coordinates=["a", "b"],
+            forcing={name: (lambda t, p: 1.45 * np.cos(p.w * t)) for name in "ab"},
+            elements={f"s{name}": E.Stop(at=name, position=0.2, restitution=0.7) for name in "ab"},
+        )
+        orbit = ns.find_orbit(system, start={"a": 0.05, "b": 0.05})
+        first, h = np.array([1.0, -1.0, 0.0, 0.0]), 1e-6
+        ends = [ns.simulate(system, periods=1, start=orbit.u + one * first).u.values[-1] for one in (h, -h)]
+        return orbit, float(np.abs((ends[0] + ends[1] - 2 * orbit.u) / h).max())
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert found(0.0)[1] < 1e-3  # the return map has no kink
+    with pytest.warns(RuntimeWarning, match="multipliers of an orbit, are those of one order"):
+        orbit, kink = found(0.3)
+    assert kink > 0.1
+    assert orbit.crossing_times[0] == pytest.approx(orbit.crossing_times[1], abs=1e-12)
+
+
 def test_pairs_that_leave_the_unit_circle_together_change_the_sign() -> None:
     pair = np.exp(np.array([1j, -1j]))
     for count in (1, 2, 3):

@@ -11,8 +11,9 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit, orbit_of
 from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.multipliers import multipliers_of, nearest_to_one, stability
-from nonsmooth.continuation.problems.orbits import Orbits
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.primitive import primitive
+from nonsmooth.continuation.problems.rounds import INSTANT
 from nonsmooth.continuation.problems.shooting import Shooting, Solved, in_a_family
 from nonsmooth.continuation.problems.solve import solve
 from nonsmooth.continuation.searches.search import search_within
@@ -186,6 +187,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
         if virtual:
             reasons.append(("virtual", f"the {name} orbit found passes through a boundary it should obey"))
         elif given or unstable or (orbit.stable and _is_near(orbit, guess, gap, left)):
+            _look_at_instants(point)
             return orbit
         elif not orbit.stable:
             kind = stability(orbit.floquet_multipliers, shooting.forced)
@@ -203,6 +205,16 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
     raise SolveError(
         f"the motion settled on no periodic orbit that could be confirmed: {said}. {remedy}", status=status
     )
+
+
+def _look_at_instants(point: OrbitPoint) -> None:
+    """Warn of transitions at one instant whose order matters to the multipliers (``saltation.of_one_instant``)."""
+    shooting, times = point.shooting, point.once.times
+    last = np.flatnonzero(np.diff(times, append=np.inf) > INSTANT * point.period)
+    for i, j in zip([0, *(last[:-1] + 1).tolist()], last.tolist(), strict=True):
+        if j > i:
+            chain = [visit.transition for visit in shooting.signature.visits[i : j + 1]]
+            shooting.flow.jump(point.values, chain, float(times[i]), point.solved.segments.z[i])
 
 
 def _why(shooting: Shooting, tried: Solved, name: str) -> tuple[str, str]:

@@ -143,7 +143,8 @@ def _beside(a: Jump, b: Jump) -> Jump:
     if not np.allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(one).max()):
         warnings.warn(
             "two transitions happen at one instant, each by itself, and which of them a neighbouring motion meets "
-            "first matters: derivatives are those for one order. Start a little off for another.",
+            "first matters: derivatives, and multipliers of an orbit, are those of one order, and do not hold for the "
+            "other.",
             RuntimeWarning,
             stacklevel=2,
         )
