@@ -158,21 +158,26 @@ def test_a_fold_of_copies_is_a_fold() -> None:
     assert found(2) == [(kind, pytest.approx(place, abs=1e-8)) for kind, place in one]
 
 
+def equal_masses(damping: float) -> ns.System:
+    """Two with a stop each and a spring between them; in phase they move as one alone."""
+    between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return ns.mechanical(
+        np.eye(2),
+        0.16 * np.eye(2) + damping * between,
+        0.81 * np.eye(2) + 0.5 * between,
+        parameters={"w": 1.47},
+        coordinates=["a", "b"],
+        forcing={name: (lambda t, p: 1.45 * np.cos(p.w * t)) for name in "ab"},
+        elements={f"s{name}": E.Stop(at=name, position=0.2, restitution=0.7) for name in "ab"},
+    )
+
+
 @pytest.mark.physics
 def test_multipliers_that_hold_for_one_order_of_two_impacts_are_warned_of() -> None:
     """Two equal masses that strike together: a spring between them leaves the order alone, a damper does not."""
 
     def found(damping: float) -> tuple[ns.Orbit, float]:
-        between = np.array([[1.0, -1.0], [-1.0, 1.0]])
-        system = ns.mechanical(
-            np.eye(2),
-            0.16 * np.eye(2) + damping * between,
-            0.81 * np.eye(2) + 0.5 * between,
-            parameters={"w": 1.47},
-            coordinates=["a", "b"],
-            forcing={name: (lambda t, p: 1.45 * np.cos(p.w * t)) for name in "ab"},
-            elements={f"s{name}": E.Stop(at=name, position=0.2, restitution=0.7) for name in "ab"},
-        )
+        system = equal_masses(damping)
         orbit = ns.find_orbit(system, start={"a": 0.05, "b": 0.05})
         first, h = np.array([1.0, -1.0, 0.0, 0.0]), 1e-6
         ends = [ns.simulate(system, periods=1, start=orbit.u + one * first).u.values[-1] for one in (h, -h)]
@@ -185,6 +190,25 @@ def test_multipliers_that_hold_for_one_order_of_two_impacts_are_warned_of() -> N
         orbit, kink = found(0.3)
     assert kink > 0.1
     assert orbit.crossing_times[0] == pytest.approx(orbit.crossing_times[1], abs=1e-12)
+
+
+@pytest.mark.physics
+def test_where_masses_part_that_struck_together_is_a_branch_point() -> None:
+    """It was called transcritical, by second derivatives for one order of the impacts: the other mirrors it."""
+    orbit = ns.find_orbit(equal_masses(0.0).with_parameters(w=1.95), start={"a": 0.05, "b": 0.05})
+    special = ns.special_points(ns.continue_orbit(orbit, "w", (1.9, 2.1)))
+    assert special["kind"].values.tolist() == ["branch_point"]
+    w = float(special["w"].values[0])
+    away = ns.continue_orbit(special.isel(special=0), points=10)
+    assert (away["w"].values[1:] < w).all()  # and its mirror image: nothing branches off above
+    a, b = away["section"].sel(state=["a", "b"]).values[-1]
+    back = ns.simulate(
+        equal_masses(0.0).with_parameters(w=float(away["w"].values[-1])),
+        periods=1,
+        start=np.array([b, a, *away["section"].sel(state=["v_b", "v_a"]).values[-1]]),
+    )
+    assert abs(a - b) > 1e-3
+    assert back.u.values[-1] == pytest.approx(back.u.values[0], abs=1e-9)
 
 
 def test_pairs_that_leave_the_unit_circle_together_change_the_sign() -> None:

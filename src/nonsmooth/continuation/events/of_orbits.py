@@ -57,6 +57,7 @@ from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.multipliers import distinct, product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.primitive import is_doubled
+from nonsmooth.continuation.problems.rounds import INSTANT
 from nonsmooth.continuation.problems.shooting import Shooting, in_a_family
 from nonsmooth.continuation.problems.signature import AT_ONCE
 from nonsmooth.continuation.searches.settled import touching
@@ -139,8 +140,9 @@ class BranchPointOfOrbits(BranchPoint):
             return None  # a contact of no length turns the determinant's sign too
         if is_doubled(point):
             return "flip", "branching"
-        # Of several parts that part at once many branches cross: no two tangents tell of what kind it is.
-        return super().named(step, point) if _once(point) is None else (self.name, None)
+        # Where copies part many branches cross, and of what happens at one instant second derivatives know one order.
+        several = _once(point) is not None or point.path.tau.min() <= INSTANT * point.period
+        return (self.name, None) if several else super().named(step, point)
 
 
 def _once(point: Any) -> float | None:
