@@ -19,7 +19,7 @@ from nonsmooth import ParameterSet, Recording, __version__, compare
 from nonsmooth.models import discontinuous_support
 from nonsmooth.recordings import Session, load_session
 from nonsmooth.recordings.signals.displacement import found_resolution
-from nonsmooth_savi2007.comparison import gap_offset, session_measurement
+from nonsmooth_savi2007.comparison import GapReference, gap_offset, gap_reference, session_measurement
 from nonsmooth_savi2007.identification.chain import identify
 from nonsmooth_savi2007.rig import IDENTIFICATION, VirtualRig
 from nonsmooth_savi2007.rig.notebook import write_session
@@ -53,6 +53,7 @@ class Laboratory:
     def __init__(self, folder: Path, quick: bool = False, procedures: Collection[str] = IDENTIFICATION) -> None:
         self.folder, self.quick, self.procedures = Path(folder), quick, procedures
         self.folder.mkdir(parents=True, exist_ok=True)
+        self._references: dict[Path, GapReference] = {}
 
     @cached_property
     def rig(self) -> VirtualRig:
@@ -115,8 +116,11 @@ class Laboratory:
         self, session: Session, procedure: str, runs: str | Sequence[str]
     ) -> tuple[xr.Dataset, dict[str, Any]]:
         """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
-        offset = gap_offset(self.identified, self.session)
-        return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=offset)
+        if session.folder not in self._references:  # once for all runs of a session: its decays are fitted for it
+            offset = gap_offset(self.identified, self.session)
+            self._references[session.folder] = gap_reference(session, offset=offset)
+        reference = self._references[session.folder]
+        return session_measurement(session, procedure, runs, k=self.identified["k"], reference=reference)
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""
