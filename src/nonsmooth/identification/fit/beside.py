@@ -19,6 +19,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, inverted, reduced, settle
 from nonsmooth.identification.fit.first_level import BETTER, Stage
 from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.fit.windows import Windows
 
 _AWAY = (2.0, 3.5, 5.0, 6.5, 8.0, 10.0, 12.0)  # standard uncertainties
 _LESS = 0.5  # of the least rise of a parabola: below, there is another piece
@@ -47,14 +48,24 @@ def _beside(grown: Grown) -> list[tuple[float, int, FloatArray]]:
     weights = problem.weights(state)
     covariance = inverted(reduced(problem, state, weights, len(theta))[0] + u.precision)[0]
     least, found = problem.cost(theta, grown.starts, weights), []
+    here = _transitions(problem, theta, grown.starts)
     for i, error in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
-        for far in (*_AWAY, *(-far for far in _AWAY)) if error > 0.0 else ():
-            place = np.where(np.arange(len(theta)) == i, theta[i] + far * error, theta)
-            if u.low[i] <= place[i] <= u.high[i]:
-                rise = problem.cost(place, grown.starts, weights) - least
+        for side in (1.0, -1.0) if error > 0.0 else ():
+            fars = [side * far for far in _AWAY if u.low[i] <= theta[i] + side * far * error <= u.high[i]]
+            places = {far: np.where(np.arange(len(theta)) == i, theta[i] + far * error, theta) for far in fars}
+            if fars and not problem.steady and _transitions(problem, places[fars[-1]], grown.starts) == here:
+                fars = fars[-1:]  # the same piece as far as that
+            for far in fars:
+                rise = problem.cost(places[far], grown.starts, weights) - least
                 if rise < _LESS * far**2:
-                    found.append((rise, i, place))
+                    found.append((rise, i, places[far]))
     return sorted(found, key=lambda row: row[0])
+
+
+def _transitions(problem: Windows, theta: FloatArray, starts: FloatArray) -> list[list[int] | None]:
+    """The transitions of each window's motion; None where it does not come to its end."""
+    motions = [problem.motion(theta, window, start) for window, start in zip(problem.pieces, starts, strict=True)]
+    return [None if one is None else one.log.crossing_transition.tolist() for one in motions]
 
 
 def _better(grown: Grown, beside: list[tuple[float, int, FloatArray]]) -> Stage | None:

@@ -1,0 +1,32 @@
+"""Places beside its optimum at which a fit looks for other minima."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from nonsmooth.identification.fit import beside
+
+
+@pytest.mark.parametrize("another_piece", [True, False])
+def test_places_between_are_looked_at_where_the_farthest_is_of_another_piece(
+    another_piece: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sum of squares with a dip at five standard uncertainties, which a motion of one piece cannot have."""
+
+    def motion(theta: np.ndarray, window: None, start: None) -> SimpleNamespace:
+        return SimpleNamespace(log=SimpleNamespace(crossing_transition=np.arange(another_piece and theta[0] > 4.0)))
+
+    def cost(theta: np.ndarray, starts: list[None], weights: None) -> float:
+        return float(theta[0] ** 2 * (theta[0] != 5.0))
+
+    monkeypatch.setattr(beside, "reduced", lambda *_: (np.eye(1),))
+    unknowns = SimpleNamespace(low=np.array([-20.0]), high=np.array([9.0]), precision=np.zeros((1, 1)))
+    problem = SimpleNamespace(
+        unknowns=unknowns, pieces=[None], steady=(), motion=motion, cost=cost, residuals=lambda *_: None
+    )
+    problem.weights = lambda state: state
+    found = beside._beside(SimpleNamespace(problem=problem, theta=np.zeros(1), starts=[None]))
+    assert [place.tolist() for _, _, place in found] == [[5.0]] * another_piece
