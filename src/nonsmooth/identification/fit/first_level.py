@@ -24,7 +24,7 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError, check_keys, shortened
-from nonsmooth.identification.arrow import Residuals, settle
+from nonsmooth.identification.arrow import Residuals, inverted, reduced, settle
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.recordings.recording import runs_of
@@ -75,6 +75,21 @@ def level(stage: Stage, used: Any = None) -> Stage:
         raise SolveError("a motion over longer windows, or to a steady state, does not come to its end")
     known = problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
     return Stage(problem, *settle(problem, stage.theta, stage.starts, used, known, rough=True))
+
+
+def foreseen(problem: Windows, theta: FloatArray, starts: FloatArray) -> float:
+    """The sum of squared residuals over the noise to which derivatives lead from here, all starts free."""
+    state, u = problem.residuals(theta, starts, True), problem.unknowns
+    known = u.precision + np.diag(own_size(problem) ** -2.0)
+    normal, right, back = reduced(problem, state, problem.weights(state), len(theta))
+    if not np.isfinite(normal).all():
+        return 0.0
+    step, found = inverted(normal + known)[0] @ (right - known @ (theta - u.centre)), 0.0
+    for i, (piece, (inverse, cross, part)) in enumerate(zip(problem.pieces, back, strict=True)):
+        own, n = step[piece.which], len(piece.readings[0])
+        left = state.residuals[i] - state.in_parameters[i] @ own - state.in_start[i] @ (inverse @ (part - cross @ own))
+        found += float(np.sum((left[:n] / problem.noise[piece.readings[1]]) ** 2))
+    return found if np.isfinite(found) else 0.0
 
 
 def own_size(problem: Windows) -> FloatArray:

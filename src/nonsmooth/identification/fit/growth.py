@@ -16,7 +16,15 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Residuals, Unsettled, inverted, reduced, settle
-from nonsmooth.identification.fit.first_level import BETTER, Stage, level, other_beginnings, rechosen, settle_first
+from nonsmooth.identification.fit.first_level import (
+    BETTER,
+    Stage,
+    foreseen,
+    level,
+    other_beginnings,
+    rechosen,
+    settle_first,
+)
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.steady import ROUNDING
@@ -31,6 +39,7 @@ _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share
 _NEAR = 0.6  # residuals of a guess over the readings' own size, up to which the longest windows are fitted from it
 _QUIET = 0.5  # residuals of the first windows over irregularity, from which these are the noise
 _CHANCE = 1e-6  # that short windows fit so much better by chance
+_NO_CHANCE = 1e-3  # by derivatives at the fit over long ones: short ones need not be fitted to see that they do not
 _EXACT = 1e-4  # of the noise squared: residuals of short windows that are those of the arithmetic
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
 _ROUNDS = 12  # of noise from residuals and residuals from noise
@@ -191,18 +200,24 @@ def _opens(whole: Grown, length: float, start: FloatArray | None, free: bool) ->
 
     plain = whole.problem.plain
     now = plain.of(first_windows(plain, whole.theta, length, start, free))
-    try:
-        opened = level(Stage(now, whole.theta, now.starts))
-    except SolveError:
-        return False
-    closed = Stage(plain, whole.theta, whole.starts)
+    stage, closed = Stage(now, whole.theta, now.starts), Stage(plain, whole.theta, whole.starts)
     (few, total), (many, all_) = _freedom(now), _freedom(plain)
     if total != all_ or not many > few:
         return False
+
+    def chance(opened: float, shared: float = 1.0) -> float:
+        """That noise alone lets them fit so much better."""
+        gained = (_reduced(closed) * many - opened * few) / (many - few)
+        return float(f.sf(gained / max(opened, _EXACT) / shared, many - few, few))
+
+    if chance(foreseen(now, stage.theta, stage.starts) / few) > _NO_CHANCE:
+        return False
+    try:
+        opened = level(stage)
+    except SolveError:
+        return False
     shared = [correlation_times(np.concatenate(parts(now, opened.state, c))) for c in range(len(now.sensors))]
-    least = max(_reduced(opened), _EXACT)
-    gained = (_reduced(closed) * many - _reduced(opened) * few) / (many - few)
-    return bool(f.sf(gained / least / max(shared), many - few, few) < _CHANCE)
+    return chance(_reduced(opened), max(shared)) < _CHANCE
 
 
 def _longer_windows(stage: Stage, length: float) -> Stage | None:
