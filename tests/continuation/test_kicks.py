@@ -55,3 +55,30 @@ def test_the_section_of_a_branch_lies_behind_a_kick_at_phase_0(kind: str) -> Non
     for J, section in zip(branch["J"].values[::4], branch["section"].values[::4], strict=True):
         after = returned(system.with_parameters(J=J), section.ravel()[:2], orbit.period_number)
         np.testing.assert_allclose(after, section.ravel()[:2], atol=1e-8)
+
+
+def four_loads(periods: int) -> ns.System:
+    """Four loads in turn on a mass before a stop, once in two units of time: the last of them for 0.9 units."""
+    ends = {"last": 0.1, "first": 0.3, "second": 0.7, "third": 1.1}
+    names = [*ends]
+    return ns.System(
+        states=["x", "v"],
+        parameters={"d": 0.47},
+        modes={name: lambda t, u, p, q=name: (u.v, (q == "last") - 9.0 * u.x - 0.4 * u.v) for name in names},
+        indicators={"stop": lambda t, u, p: u.x - p.d},
+        transitions=[
+            *(ns.Transition(a, a, when="stop > 0", reset=lambda t, u, p: (u.x, -0.5 * u.v)) for a in names),
+            *(ns.Transition(a, b, at=ends[a] / periods % 1) for a, b in zip(names, names[1:] + names[:1], strict=True)),
+        ],
+        period=float(periods),
+    )
+
+
+def test_two_periods_are_one_of_twice_the_length() -> None:
+    """Through a corner and a graze, also where the longest part of the orbit lies behind the first period."""
+    one, two = (ns.continue_orbit(ns.find_orbit(four_loads(n)), "d", (0.46, 0.58)) for n in (2, 1))
+    assert two["period_number"] == 2 * one["period_number"] == 2
+    assert one["special_kind"].values.tolist() == two["special_kind"].values.tolist() == ["corner", "grazing"]
+    assert (one["ended"] == two["ended"]).all() and (two["ended"] == two["ended"][0]).all()
+    for name in ("d", "section", "floquet_multipliers"):
+        np.testing.assert_allclose(two[name].values, one[name].values, atol=1e-7)

@@ -65,6 +65,25 @@ def test_a_period_number_that_the_orbit_has_not() -> None:
     assert caught.value.status == "shorter_period"
 
 
+@pytest.mark.parametrize(
+    ("system", "word"),
+    [
+        (ns.models.impact_oscillator(omega=1.5, d=0.3, c=0.3), "period-1"),
+        (ns.models.stick_slip_belt(), "a shorter one"),  # not forced: a period of its own
+    ],
+    ids=["one impact a period", "one stick a round"],
+)
+def test_nor_has_one_with_transitions(system: ns.System, word: str) -> None:
+    """Rounds of an orbit with transitions are told by its first one, which begins anew after the time of one round."""
+    start = {"v": 0.5}
+    once = ns.find_orbit(system, start=start)
+    assert once.stable and len(once.signature.crossings) > 0
+    for rounds in (2, 3):
+        with pytest.raises(ns.SolveError, match=f"orbit found is {word}, gone round several times") as caught:
+            ns.find_orbit(system, start=once.u, period_number=rounds)
+        assert caught.value.status == "shorter_period"
+
+
 @pytest.mark.parametrize("phase", [0.0, 0.3])
 def test_modes_that_alternate(phase: float) -> None:
     """x' = -x and x' = -3 x in turn: x = 0 returns after one period, the mode after two, with exp(-4).

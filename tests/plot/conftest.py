@@ -1,4 +1,4 @@
-"""The rule that holds for every picture of a test: nothing drawn leaves its axes."""
+"""The rule that holds for every picture of a test: nothing drawn leaves its axes, and it fills half their breadth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def window() -> None:
 
 @pytest.fixture(autouse=True)
 def whole_pictures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """No line that a test has drawn leaves its axes."""
+    """No line that a test has drawn leaves its axes, and all that is drawn fills more than half of their breadth."""
     plt.close("all")
     yield
     every = [ax for number in plt.get_fignums() for ax in plt.figure(number).axes]
@@ -25,6 +25,8 @@ def whole_pictures(request: pytest.FixtureRequest) -> Iterator[None]:
     if "window" in request.fixturenames:
         return
     for ax in every:
+        breadth = np.ptp(ax.dataLim.intervalx)
+        assert not 0 < breadth < np.inf or ax.get_xscale() != "linear" or breadth > 0.5 * np.ptp(ax.get_xlim())
         image = any(isinstance(one, QuadMesh) for one in ax.collections)
         for line in ax.lines if not image else ():
             if line.get_transform() != ax.transData:

@@ -156,6 +156,16 @@ def test_the_parts_and_their_labels_are_drawn(chain) -> None:
         assert low <= np.nanmin(x) <= np.nanmax(x) <= high
 
 
+@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("name", ["bilinear_oscillator", "impact_damper", "impact_oscillator", "stick_slip_belt"])
+def test_a_sketch_fills_its_paper(name: str, moving: bool) -> None:
+    """Over a base that moves, over a belt, beside walls: no side is further from its parts than a label is high."""
+    sketch = Sketch(scheme_of(getattr(ns.models, name)()), moving)
+    x, y = (np.concatenate([np.ravel(part[k]) for part in sketch.parts()]) for k in (1, 2))
+    assert 0 < np.nanmin(y) - sketch.bottom < 0.3 and 0 < sketch.top - np.nanmax(y) < 0.3
+    assert abs(np.nanmin(x) - sketch.left) < 0.15 and abs(sketch.right - np.nanmax(x)) < 0.15
+
+
 def test_a_belt_lies_on_both_rollers() -> None:
     pen = Pen(labels=False)
     pen.belt(0.0, 2.0, "")

@@ -401,3 +401,15 @@ def test_arrays_of_hdf5_with_rates_of_their_own(tmp_path: Path) -> None:
         ns.errors.DataFileError, match=r"several rates, 'trial\.x' at 10 Hz, 'trial\.force' at 5 Hz; choose"
     ):
         ns.load_recording(path, columns={"x": "trial.x", "f": "trial.force"})
+
+
+def test_pictures_beside_readings_are_left_out_and_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+
+    def fill(file: Any) -> None:
+        file["sensor/x"], file["camera/images"] = np.arange(50.0), np.zeros((50, 4, 3))
+
+    path.write_bytes(hdf5(fill))
+    with pytest.warns(ns.recordings.RecordingWarning, match=r"'images': has the shape \(50, 4, 3\), which .* left out"):
+        recording = ns.load_recording(path, rate=100.0, units={"x": "m"})
+    assert recording.runs == ("sensor",) and recording.channel("x").values == pytest.approx(np.arange(50.0))

@@ -112,6 +112,28 @@ def test_exponents_of_chaos_are_those_of_long_runs() -> None:
     assert np.isnan(report.state_difference)
 
 
+@pytest.mark.parametrize(("border", "number"), [(8.5, 2), (7.5, 1)])
+def test_starts_lie_in_the_orbits_range_twice_as_wide(border: float, number: int) -> None:
+    """x' = c - x + sqrt(2) cos t with c = 10 above a border and 0 below it: 10 + cos(t - pi / 4) has the range 9 to 11,
+    and of starts between 8 and 12 those below the border go to the motion about 0."""
+
+    def motion(c: float) -> Any:
+        return lambda t, u, p: (c - u.x + np.sqrt(2.0) * np.cos(t),)
+
+    system = ns.System(
+        states=["x"],
+        parameters={"border": border},
+        modes={"above": motion(10.0), "below": motion(0.0)},
+        indicators={"side": lambda t, u, p: u.x - p.border},
+        transitions=[
+            ns.Transition("above", "below", when="side < 0"),
+            ns.Transition("below", "above", when="side > 0"),
+        ],
+    )
+    report = ns.smoothing_report(system, [1e-3], start=[10.7], n_starts=40, transient=5, progress=False)
+    assert report.reference_n_attractors == report.n_attractors.item() == number
+
+
 def test_counterparts_are_the_nearest_of_the_same_period() -> None:
     def found(number: int, high: float, low: float = -1.0) -> FoundAttractor:
         return FoundAttractor(number, np.array([[high, 1.0], [low, -1.0]]))

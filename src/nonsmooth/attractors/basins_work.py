@@ -31,7 +31,7 @@ class StartsWork:
 
     def columns(self) -> dict[str, ColumnType]:
         n = self.starts.shape[1]
-        kinds = {"period_number": "i8", "status": "i8", "mode": "i8", "returns": "i8"}
+        kinds = {"period_number": "i8", "status": "i8", "mode": "i8"}
         wide = {"maximum": (n,), "minimum": (n,), "last": (self.settler.width,)}
         unknown = {"status": codes.INTERRUPTED}
         return {

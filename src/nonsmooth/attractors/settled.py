@@ -47,8 +47,7 @@ def least_sizes(method: str, scale: FloatArray) -> tuple[FloatArray, float]:
 class Settled:
     """Results of J jobs. Extremes and counts are over whole cycles where there is a period, else the kept window.
 
-    ``multiplier`` is the largest modulus over ``period_number`` returns (NaN: unknown); ``returns`` the section
-    returns run.
+    ``multiplier`` is the largest modulus over ``period_number`` returns (NaN: unknown).
     """
 
     period_number: IntArray  # (J,)
@@ -61,7 +60,6 @@ class Settled:
     minimum: FloatArray  # (J, n)
     last: FloatArray  # (J, width): the section point at the end, and what else is needed to go on from there
     mode: IntArray
-    returns: IntArray
 
     @classmethod
     def empty(cls, jobs: int, n: int, width: int | None = None) -> Settled:
@@ -87,7 +85,6 @@ class Settled:
             state(),
             state(width or n),
             whole(),
-            whole(),
         )
 
     @classmethod
@@ -99,7 +96,6 @@ class Settled:
         """The same with what was found out about the jobs; statuses of results in place of the kernel's codes."""
         for name in ("period_number", "status", "residual", "multiplier"):
             getattr(self, name)[:] = getattr(jobs, name)
-        self.returns[:] = jobs.spent
         failed = ~usable(self.status)
         self.status[failed] = [result_status(code) for code in self.status[failed]]
         return self

@@ -124,6 +124,20 @@ def test_a_result_at_hand_is_a_theory_too() -> None:
         compare(record(system), run, settings={"g": 0.0})
 
 
+def test_a_motion_without_a_period_is_shown_over_its_last_periods() -> None:
+    """x'' + 2 x = cos t from (3/2, 0) is x = cos(sqrt(2) t) / 2 + cos t; of 60 periods the last 16 are kept."""
+    modes = {"free": lambda t, u, p: (u.v, -2.0 * u.x + np.cos(p.omega * t))}
+    system = ns.System(states=["x", "v"], parameters={"omega": 1.0}, modes=modes)
+    run = ns.simulate(system, periods=60, start={"x": 1.5}, samples=60 * 64 + 1)
+    measured = run.assign(phase=("time", run["time"].values / (2 * np.pi)))
+    found = compare(measured, run, noise={"x": 1e-6, "v": 1e-6})
+    assert int(found["theory_period_number"]) == int(found["measured_period_number"]) == 0
+    for name in ("theory", "measured"):
+        t = 2 * np.pi * (44 + found[f"{name}_phase"].values)
+        x, v = 0.5 * np.cos(np.sqrt(2) * t) + np.cos(t), -np.sqrt(0.5) * np.sin(np.sqrt(2) * t) - np.sin(t)
+        assert found[f"{name}_orbit"].values == pytest.approx(np.stack([x, v], axis=-1), abs=1e-5)
+
+
 def test_a_response_with_its_jumps(tmp_path: Path) -> None:
     """Fig. 9: jumps of the model at 5.8 (rising) and 5.16 (falling), from steps as coarse as an experiment's."""
     settings = {"rho": 0.14, "g": 0.02}

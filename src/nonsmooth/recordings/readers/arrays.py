@@ -37,13 +37,13 @@ def read(data: bytes, reading: Reading) -> None:
         reading.traces = list(traces_of(_chosen(variables, reading), reading))
         return
     containers = list(_containers("", variables, 0))
-    holds = _is_vector if reading.rate is None else _is_series
+    holds = _is_vector if reading.rate is None else _is_array
 
     def rated(node: Group) -> bool:
         return bool(node.rate or node.rates)
 
     vectors = [
-        (path, node) for path, node in containers if any(map(_is_series if rated(node) else holds, node.values()))
+        (path, node) for path, node in containers if any(map(_is_array if rated(node) else holds, node.values()))
     ]
     keys = [(path, node, _axis_of(node, reading.axis)) for path, node in vectors]
     found = [(path, node, key) for path, node, key in keys if key is not None or reading.rate or rated(node)]
@@ -110,10 +110,6 @@ def _is_array(value: Any) -> bool:
 
 def _is_vector(value: Any) -> bool:
     return _is_array(value) and max(value.shape) == value.size
-
-
-def _is_series(value: Any) -> bool:
-    return _is_array(value) and value.ndim < 3
 
 
 def _note(value: Any) -> str:
