@@ -47,7 +47,7 @@ SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, as
 LOOKS = {  # of a mark: how thick, large, pale, far from its neighbour; and which line a warning names
     *("alpha", "elinewidth", "fontsize", "labelpad", "linewidth", "linewidths", "lw", "markersize", "markeredgewidth"),
     *("columnspacing", "fill_alpha", "handlelength", "handletextpad", "line_alpha", "line_width", "ms"),
-    *("hspace", "mutation_scale", "pad", "rasterized", "stacklevel", "width_ratios", "wspace", "zorder"),
+    *("hspace", "markerscale", "mutation_scale", "pad", "rasterized", "stacklevel", "width_ratios", "wspace", "zorder"),
 }
 NO_ANSWER = {"default_rng", "bar", "progress_bar"}  # a seed that stands there is one of many; bars of progress
 FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]

@@ -6,10 +6,13 @@ their closed form, parametrised by the amplitude, so that they hang over and hol
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from nonsmooth.identification.amplitude_dependent import ResponseCurve, amplitude_dependent
+import nonsmooth as ns
+from nonsmooth.identification.amplitude_dependent import ResponseCurve, amplitude_dependent, response_curves
 from nonsmooth.identification.nonlinear_mode import NonlinearMode
 
 W0, C, BETA, MASS = 2 * np.pi * 20.0, 2.0, 3e8, 1.7  # rad/s, 1/s, 3/4 alpha, kg
@@ -135,6 +138,39 @@ def test_stated_errors_cover_noise_and_curves_that_differ() -> None:
     by_quantity = np.sqrt(np.mean(np.square(z).reshape(12, 2, 4), axis=(0, 2)))
     assert np.all((0.5 < by_quantity) & (by_quantity < 1.6)), by_quantity
     assert np.mean(spreads) == pytest.approx(1e-3 * 22, rel=0.4)  # half of 2e-3, of the mean frequency
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_as_many_knots_as_asked_for(count: int) -> None:
+    """Evenly from the least to the largest amplitude; one alone at the median."""
+    seen = [curve(f) for f in FORCES]
+    size = np.concatenate([c.amplitude for c in seen])
+    _, mode = amplitude_dependent(seen, knots=count)
+    even = np.linspace(size.min(), size.max(), count) if count != 1 else [np.median(size)]
+    np.testing.assert_allclose(mode.knots, even, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "power"), [("m", 0), ("m/s", 1), ("m/s^2", 2)])
+def test_curves_of_a_recording_are_displacements(unit: str, power: int, tmp_path: Path) -> None:
+    """Over (2 pi f)^n where the n-th rate was measured; force and phase where they are there."""
+    f, size = np.array([1.0, 2.0, 4.0]), np.array([0.2, 0.7, 0.3])
+    path = tmp_path / "shaker.csv"
+    rows = [f"{a},{b},0.5,{-c}" for a, b, c in zip(f, size, (0.1, 1.5, 3.0), strict=True)]
+    path.write_text("\n".join([f"frequency (Hz),amplitude ({unit}),force (N),phase (rad)", *rows]))
+    recording = ns.load_recording(path, axis="frequency")
+    (one,) = response_curves(recording)
+    assert (one.name, one.force.tolist(), one.phase.tolist()) == (recording.runs[0], [0.5] * 3, [-0.1, -1.5, -3.0])
+    np.testing.assert_allclose(one.amplitude * (2 * np.pi * f) ** power, size, rtol=1e-14)
+    assert one.frequency.tolist() == f.tolist()
+    (bare,) = response_curves(recording, force=None, phase=None)
+    assert bare.force is None and bare.phase is None
+
+
+def test_curves_of_a_recording_stand_over_frequency(tmp_path: Path) -> None:
+    path = tmp_path / "shaker.csv"
+    path.write_text("time (s),amplitude (m)\n0,1\n1,2\n2,1\n3,2")
+    with pytest.raises(ValueError, match="stands over 'time'; read it with load_recording"):
+        response_curves(ns.load_recording(path), force=None, phase=None)
 
 
 def test_doors() -> None:

@@ -9,6 +9,7 @@ import nonsmooth as ns
 from nonsmooth.identification.arrow import Residuals, Unsettled, sandwich, settle
 from nonsmooth.identification.finding import (
     Estimate,
+    Finding,
     correlated,
     coverage_factor,
     uniform,
@@ -38,6 +39,27 @@ def test_a_factor():
     for value in (0.0, -2.0):  # no factor holds it
         own, plain = Estimate(value, 0.4, logarithmic=True), Estimate(value, 0.4)
         assert own.interval() == plain.interval() and str(own) == str(plain)
+
+
+def test_a_product_and_the_half_interval_of_an_estimate():
+    """m b of b = 4 +- 0.3 by m = 2 +- 0.05: sqrt((2 * 0.3)^2 + (4 * 0.05)^2); 95 % of a normal quantity is 1.96 of its
+    standard uncertainty to either side, of a logarithmic one wider above than below."""
+    b = Estimate(4.0, 0.3, "1/s")
+    c = b.times(2.0, 0.05, "N s/m")
+    assert (c.value, c.uncertainty, c.unit) == (8.0, pytest.approx(np.hypot(0.6, 0.2)), "N s/m")
+    assert float(b) == 4.0 and b.times(-1.0).unit == "1/s"
+    assert Estimate(1.0, 0.2, half_width=0.3).times(-2).half_width == 0.6
+    assert b.expanded == pytest.approx(1.959964 * 0.3, rel=1e-6)
+    factor = np.exp(1.959964 * 0.3 / 4.0)
+    assert Estimate(4.0, 0.3, logarithmic=True).expanded == pytest.approx(4.0 * (factor - 1), rel=1e-6)
+
+
+def test_a_finding_is_what_its_record_says():
+    others = {"c": Estimate(1.0, 0.1)}
+    record = Finding("k", Estimate(4.0, np.inf, "N/m"), "by hand", 3, ("a",), ("one",), others).to_record()
+    again = Finding.from_record(record)
+    assert again.to_record() == record and again.others["c"] == Estimate(1.0, 0.1)
+    assert (again.value, again.uncertainty, again.interval()) == (4.0, np.inf, (-np.inf, np.inf))
 
 
 def test_correlation_of_an_autoregressive_series():

@@ -413,3 +413,16 @@ def test_pictures_beside_readings_are_left_out_and_told(tmp_path: Path) -> None:
     with pytest.warns(ns.recordings.RecordingWarning, match=r"'images': has the shape \(50, 4, 3\), which .* left out"):
         recording = ns.load_recording(path, rate=100.0, units={"x": "m"})
     assert recording.runs == ("sensor",) and recording.channel("x").values == pytest.approx(np.arange(50.0))
+
+
+def test_a_file_as_large_as_allowed_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.npz"
+    path.write_bytes(npz(time=T, x=X))
+    size = path.stat().st_size
+    for limit in (size, size - 1):
+        monkeypatch.setattr("nonsmooth.recordings.load.MAX_FILE_BYTES", limit)
+        if limit == size:
+            assert ns.load_recording(path, units={"time": "s", "x": "m"}).channel("x").values == pytest.approx(X)
+        else:
+            with pytest.raises(ns.DataFileError, match=f"has {size} bytes; at most {limit} are read"):
+                ns.load_recording(path)

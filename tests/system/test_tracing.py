@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.symbolic.scalar import where
+from nonsmooth.system.symbolic.scalar import Scalar, where
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition
 
@@ -112,6 +112,28 @@ def test_the_expressions_compute_what_the_function_computes(field):
         assert np.allclose(compiled(t, (x, v), system.parameter_vector()), truth, rtol=1e-14, atol=1e-15)
 
 
+def test_each_function_of_numpy_that_is_known_is_numpys():
+    """All that the refusal of another one names, of numbers on both sides of nought, at it and beyond one."""
+    symbols = sp.symbols("x y", real=True)
+    with pytest.raises(SystemDefinitionError) as refused:
+        np.gcd(*map(Scalar, symbols))
+    names = str(refused.value).partition("known are ")[2].replace("np.", "").split(", ")
+    assert len(names) > 50
+    for name in names:
+        function, seen = getattr(np, name), 0
+        taken = function.nargs - function.nout
+        traced = function(*map(Scalar, symbols[:taken]))
+        held = traced.expression if isinstance(traced, Scalar) else traced.relation
+        compute = sp.lambdify(symbols, held, modules="math")
+        for x, y in ((0.6, 0.7), (-0.6, 0.7), (1.7, -0.7), (0.0, 0.7), (0.7, 0.7), (3.0, -2.0)):
+            with np.errstate(all="ignore"):
+                truth = function(*(x, y)[:taken])
+            if np.isfinite(truth):
+                assert compute(x, y) == pytest.approx(truth, rel=1e-14, abs=1e-15), (name, x, y)
+                seen += 1
+        assert seen > 0, name
+
+
 def test_each_function_is_called_once():
     calls = []
 
@@ -152,6 +174,15 @@ def test_where_on_parameters_outputs_and_resets_is_allowed():
     )
     assert system.traced.transitions[0].reset[1].has(sp.Piecewise)
     assert float(where(np.array(True), 1.0, 2.0)) == 1.0
+
+
+@pytest.mark.parametrize("a", [-1.0, 1.0, 3.0])
+@pytest.mark.parametrize("b", [-1.0, 1.0, 3.0])
+def test_conditions_are_joined_and_reversed(a, b):
+    x, y = sp.symbols("x y")
+    p, q = Scalar(x), Scalar(y)
+    found = where((p > 0) & ~(q > 0) | (q > 2), 1.0, 0.0).expression
+    assert bool(found.subs({x: a, y: b})) == ((a > 0 and not b > 0) or b > 2)
 
 
 @pytest.mark.parametrize(

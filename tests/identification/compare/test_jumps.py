@@ -111,3 +111,13 @@ def test_measured_sections_say_where_turns_are_too_few() -> None:
     found = measured_sections([_motion(0.01, 2.0, 12), _motion(0.01, 2.0, 4)], "g", [0.2, 0.1])
     assert found["g"].values.tolist() == [0.1, 0.2]
     assert found["period_number"].values.tolist() == [-1, 1]
+
+
+@pytest.mark.parametrize(("number", "of_sections", "of_a_response"), [(8, 8, 8), (9, 9, 0), (16, 16, 0), (17, 0, 0)])
+def test_the_longest_period_of_runs(number: int, of_sections: int, of_a_response: int) -> None:
+    """Steady runs are looked at for periods of up to 16 turns of the drive, those of a response for 8."""
+    run = _motion(0.01, 2.0, 4 * number)
+    slow = np.cos(2 * np.pi * run["phase"].values / number)[:, None]
+    motion = run.assign(u=run["u"] + 0.004 * slow)
+    assert measured_sections([motion], "g", [0.1])["period_number"].values.tolist() == [of_sections]
+    assert measured_response([motion], ["up"])["period_number"].values.tolist() == [of_a_response]

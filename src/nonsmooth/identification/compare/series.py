@@ -52,7 +52,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     xarray.Dataset
         Over ``run``: ``amplitude`` (half the range of x, the mean over forcing periods), ``amplitude_error`` (that of
         the mean: the scatter of the periods, and the error of a sample), ``omega``, ``direction``, and
-        ``period_number`` (0: none found, -1: fewer than six turns). Over ``jump``, as
+        ``period_number`` (at most 8; 0: none found, -1: fewer than six turns). Over ``jump``, as
         :func:`nonsmooth.frequency_response` has them: ``jump_direction``, ``jump_value``, ``jump_step``,
         ``jump_before`` and ``jump_after``.
     """
@@ -147,8 +147,8 @@ def measured_sections(
     -------
     xarray.Dataset
         ``section(<parameter>, iterate, state)`` at phase 0, in rising order of the parameter (NaN behind the end of a
-        shorter run), ``section_error(state)`` and ``period_number(<parameter>)`` (0: none found, -1: too
-        few turns).
+        shorter run), ``section_error(state)`` and ``period_number(<parameter>)`` (at most 16; 0: none
+        found, -1: too few turns).
     """
     order = np.argsort(values, kind="stable")
     clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8) for i in order]
