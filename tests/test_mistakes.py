@@ -518,6 +518,19 @@ MISTAKES = {
         "all: q1, q2",
         'between two: at={"q2": 1, "q1": -1}',
     ),
+    "an element between two of three coordinates that have names": (
+        "ns.mechanical(np.eye(3), np.eye(3), np.eye(3), coordinates=['a', 'b', 'c'], "
+        "elements={'s': ns.elements.Stop(at=['a', 'b'])})",
+        "the name of a coordinate, 'a', or a combination",
+        '{"c": 1, "a": -1}',
+        "not ['a', 'b']",
+    ),
+    "an element between the only coordinate and another": (
+        "ns.mechanical(1.0, 0.1, 1.0, elements={'s': ns.elements.Stop(at='q-y')})",
+        "`q-y` is not a coordinate",
+        "all: q;",
+        'between two: at={"q2": 1, "q1": -1}',
+    ),
     "a coordinate by its number": (
         "ns.mechanical(np.eye(2), 0.1 * np.eye(2), np.eye(2), elements={'b': ns.elements.Stop(at=1)})",
         "element 'b': at= is",
@@ -845,6 +858,7 @@ def test_two_ends_and_a_number_are_three_values() -> None:
         (lambda orbit, found: orbit.k, r"orbit.system.values\['k'\]"),
         (lambda orbit, found: orbit.eigenvalues, "it has clearance, .*virtual"),
         (lambda orbit, found: orbit.system.params, "a System has no 'params'; nearest: parameters"),
+        (lambda orbit, found: orbit.system.parameter, "nearest: parameters, parameter_points, parameter_vector$"),
         (lambda orbit, found: found.k, r"found\['k'\] is the value, found.estimates\['k'\]"),
         (lambda orbit, found: found.covar, "a ParameterSet has no 'covar'; nearest: covariance"),
     ],

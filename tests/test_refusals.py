@@ -6,6 +6,7 @@ Where a limit is told, what lies at the limit itself is taken.
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -141,6 +142,14 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
         r"priors = \[1.0\]: allowed are \{name: \(value, standard uncertainty\)\} and a ParameterSet",
     ),
     "one model to choose from": (lambda: ns.select_model({"a": (swing(), ["k"])}, RECORD), "at least two systems"),
+    "a model to choose from without its parameters": (
+        lambda: ns.select_model({"a": swing(), "b": (swing(), ["k"])}, RECORD),
+        r"models\['a'\] must be a pair \(system, parameters\), not System",
+    ),
+    "three things of a model to choose from": (
+        lambda: ns.select_model({"a": (swing(), ["k"]), "b": (swing(), "k", "m")}, RECORD),
+        r"models\['b'\] must be a pair \(system, parameters\), not 3 things",
+    ),
     "a plan without runs": (lambda: ns.plan_experiment(swing(), {}, ["k"], measured="x"), "give the candidates"),
     "a plan without noise": (
         lambda: ns.plan_experiment(swing(), {"one": {"duration": 9.0, "samples": 99}}, ["k"], measured="x"),
@@ -211,6 +220,12 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "a system for a rig": (
         lambda: ns.control_based_continuation(swing(), "frequency", (0.9, 1.1), frequency=1.0, amplitude=0.1),
         r"has no set_drive and no apply_force and no read; a system becomes a rig by ns.SimulatedRig\(system\)",
+    ),
+    "a rig that is not live": (
+        lambda: ns.control_based_continuation(
+            SimpleNamespace(live=swing), "frequency", (0.9, 1.1), frequency=1.0, amplitude=0.1
+        ),
+        "has no set_drive and no apply_force and no read; a VirtualRig becomes one by its method live",
     ),
     # numbers at their limits
     "99 observations": (

@@ -426,3 +426,15 @@ def test_a_file_as_large_as_allowed_is_read(tmp_path: Path, monkeypatch: pytest.
         else:
             with pytest.raises(ns.DataFileError, match=f"has {size} bytes; at most {limit} are read"):
                 ns.load_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "axis"),
+    [("Frequency (Hz),x (m)", "frequency"), ("x (m),ANGLE (rad)", "Angle"), ("TIME (s),x (m)", "time")],
+)
+def test_the_axis_is_found_whatever_its_letters(head: str, axis: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([head, *(f"{k},{k}.25" for k in range(1, 21))]))
+    x = ns.load_recording(path, axis=axis).channel("x")
+    assert x.dims == (axis,) and x.attrs["units"] == "m"
+    assert np.abs(x.values - x[axis].values) == pytest.approx(0.25)

@@ -86,6 +86,14 @@ def test_three_balls_that_touch(e: float, after: tuple[float, ...]) -> None:
     assert end(run) == pytest.approx([*after, *after], abs=1e-14)
 
 
+@pytest.mark.parametrize(("e", "after"), [(1.0, (-0.5, 0.5, 0.5, 0.5)), (0.0, (0.25, 0.25, 0.25, 0.25))])
+def test_four_balls_that_touch(e: float, after: tuple[float, ...]) -> None:
+    """The first contact and the last one do not feel each other: impulses (1 + e) / 4 of 3, 2 and 1."""
+    stops = {f"s{i}": Stop(at={f"q{i}": 1, f"q{i + 1}": -1}, position=0.0, restitution=e) for i in (1, 2, 3)}
+    run = ns.simulate(carts(4, **stops), start={"v_q1": 1.0}, duration=1)
+    assert end(run) == pytest.approx([*after, *after], abs=1e-14)
+
+
 def test_a_moving_stop_hits_a_mass_at_rest() -> None:
     run = ns.simulate(one(s=Stop(at="q", position=lambda t, u, p: -1.0 * t, restitution=1.0)), start={}, duration=1)
     assert end(run) == pytest.approx([-2.0, -2.0], abs=1e-14)

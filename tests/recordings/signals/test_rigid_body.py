@@ -86,6 +86,31 @@ def test_a_ball_needs_its_height_only() -> None:
     np.testing.assert_allclose(found.impact_time, times[1 : 1 + found.sizes["impact"]], atol=1e-7)
 
 
+def test_every_number_of_a_bounce() -> None:
+    """Speeds of 40, 28, 19.6, ... at the ground, each impact between two samples."""
+    t = np.arange(160) / RATE
+    speeds = 40.0 * 0.7 ** np.arange(9)
+    times = np.concatenate([[0.0], np.cumsum(2 * speeds / G)])
+    k = np.searchsorted(times, t, side="right") - 1
+    s = t - times[k]
+    z = speeds[k] * s - G / 2 * s**2
+    free = flights(t, z)
+    found = restitution(t, z, free)
+    n = found.sizes["impact"]
+    assert n >= 3 and found.flight.values.tolist() == list(range(n))
+    between = free["first"].values[1 : n + 1] - free["last"].values[:n]  # samples
+    np.testing.assert_allclose(found.duration, between / RATE, rtol=1e-9)
+    np.testing.assert_allclose(found.impact_height, 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.v_before, -speeds[:n], rtol=1e-6)
+    np.testing.assert_allclose(found.v_after, speeds[1 : n + 1], rtol=1e-6)
+    assert (found.restitution_error < 1e-6).all() and float(found.attrs["noise"]) < 1e-9
+    t, place, q, *_ = tossed(0, 0.0)
+    free = flights(t, place[:, 2])
+    one = corner_restitution(t, place, q, cube(), free).isel(impact=0)
+    between = int(free["first"][1]) - int(free["last"][0])
+    assert float(one.duration) == pytest.approx(between / RATE) and int(one.flight) == 0
+
+
 def test_errors_of_a_balls_restitution_are_as_stated() -> None:
     z, z_speed, z_fall, rng = [], [], [], np.random.default_rng(0)
     for _ in range(120):

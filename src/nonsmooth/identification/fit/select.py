@@ -81,7 +81,8 @@ def select_model(
     problems = {}
     for name, pair in models.items():
         if not isinstance(pair, list | tuple) or len(pair) != 2:
-            raise TypeError(f"models[{name!r}] must be a pair (system, parameters), not {type(pair).__name__}")
+            given = f"{len(pair)} things" if isinstance(pair, list | tuple) else type(pair).__name__
+            raise TypeError(f"models[{name!r}] must be a pair (system, parameters), not {given}")
         check_system(pair[0], "select_model", inputs=True)
         problems[str(name)] = problem_of(pair[0], recording, pair[1], options)
     held = _held_out(next(iter(problems.values())), folds)
