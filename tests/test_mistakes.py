@@ -308,6 +308,12 @@ MISTAKES = {
         "Reserved: ",
         "try period_",
     ),
+    "a blank in the name of an element": (
+        "ns.mechanical(1.0, 0.1, 1.0, elements={'left stop': ns.elements.Stop(at='q', position=0.1, restitution=0.5)})",
+        "'left stop' cannot name an element",
+        "must be a Python identifier",
+        "(left_stop_open)",
+    ),
     "a mass of zero": ("osc.with_parameters(m=0)", "m = 0", "divide by zero", "give m another value"),
     "an unknown parameter": (
         "osc.with_parameters(gap=0.001)",

@@ -45,6 +45,11 @@ def element_names(elements: Any) -> dict[str, Element]:
     if isinstance(elements, Mapping):
         found: dict[str, Element] = {}
         for name, element in sorted(elements.items(), key=_natural):
+            if not (isinstance(name, str) and name.isidentifier() and name[0] != "_"):
+                raise SystemDefinitionError(
+                    f"elements: {shortened(name)} cannot name an element: modes and outputs are called after it "
+                    "(left_stop_open), so it must be a Python identifier and not begin with an underscore"
+                )
             found |= element.parts(name) if isinstance(element, Element) else {name: element}
         return found
     if isinstance(elements, (str, Element)) or not isinstance(elements, Sequence):
