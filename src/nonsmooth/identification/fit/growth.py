@@ -210,7 +210,8 @@ def _opens(whole: Grown, length: float, start: FloatArray | None, free: bool) ->
         gained = (_reduced(closed) * many - opened * few) / (many - few)
         return float(f.sf(gained / max(opened, _EXACT) / shared, many - few, few))
 
-    if chance(foreseen(now, stage.theta, stage.starts) / few) > _NO_CHANCE:
+    least = foreseen(now, stage.theta, stage.starts)  # less than that of long windows, where derivatives are right
+    if least < _reduced(closed) * many and chance(least / few) > _NO_CHANCE:
         return False
     try:
         opened = level(stage)
