@@ -159,6 +159,10 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: ns.ParameterSet({}, [[1.0]]),
         r"covariance must be \(0, 0\): parameters, then extra; got \(1, 1\)",
     ),
+    "a number for an estimate": (
+        lambda: ns.ParameterSet({"k": 4.5}, [[0.01]]),
+        r"k = 4.5 is no estimate; give nonsmooth.identification.Estimate\(value, uncertainty, unit\)",
+    ),
     "no posterior": (lambda: ns.ParameterSet({}, np.zeros((0, 0))).posterior, "this set holds no posterior"),
     # systems
     "a side between": (lambda: element(gap=None, side=0), r"Stop: side is 1 .* or -1 .*, not 0"),

@@ -58,9 +58,7 @@ def frequency_response(
     chaos.
     """
     if parameter is None:
-        t = system.traced
-        known = [name for name, p in zip(t.parameter_names, t.p, strict=True) if t.period and t.period.has(p)]
-        parameter = known[0] if len(known) == 1 else "omega"
+        parameter = forcing_parameter(system)
     if parameter not in system.parameters:
         raise ValueError(
             unknown(parameter, "a parameter", repr(system.name), system.parameters) + "; choose one with parameter="
@@ -69,6 +67,13 @@ def frequency_response(
         return _response(system, sweep(system, parameter, values, direction=direction, **options), parameter)
     except Interrupted as error:
         raise Interrupted(str(error), _response(system, error.result, parameter)) from error
+
+
+def forcing_parameter(system: System) -> str:
+    """The parameter that sets the forcing period; of several, or none, ``"omega"``."""
+    t = system.traced
+    known = [name for name, p in zip(t.parameter_names, t.p, strict=True) if t.period and t.period.has(p)]
+    return known[0] if len(known) == 1 else "omega"
 
 
 def _response(system: System, swept: xr.Dataset, parameter: str) -> xr.Dataset:

@@ -63,6 +63,11 @@ class ParameterSet(Answering, Mapping[str, float]):
         anomalies: Sequence[str] = (),
         synthetic: bool = False,
     ) -> None:
+        for name, one in {**estimates, **(extra or {})}.items():
+            if not isinstance(one, Estimate):
+                raise TypeError(
+                    f"{name} = {one!r} is no estimate; give nonsmooth.identification.Estimate(value, uncertainty, unit)"
+                )
         matrix, n = np.array(covariance, float), len(estimates) + len(extra or {})
         if matrix.shape != (n, n):
             raise ValueError(f"covariance must be ({n}, {n}): parameters, then extra; got {matrix.shape}")

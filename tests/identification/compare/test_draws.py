@@ -31,8 +31,8 @@ def test_a_rule_has_an_uncertainty_of_its_own() -> None:
 
 def test_along_a_diagram_the_error_of_a_rule_stays() -> None:
     """g follows rho; a drawn system is off its rule by the same error at every point of the diagram."""
-    from nonsmooth.identification.compare.diagram import _marched
     from nonsmooth.identification.compare.draws import Model
+    from nonsmooth.identification.compare.predict import carried
 
     rule = read_settings({"g": (lambda p: p["rho"] / 10, 1e-3)}, MODEL)
     base = nominal(MODEL, None, rule).with_parameters(omega=9.0, rho=0.1)
@@ -40,10 +40,10 @@ def test_along_a_diagram_the_error_of_a_rule_stays() -> None:
     grid = np.array([0.05, 0.1])
     options = {"grid": 128, "transient": 300, "max_period": 4, "draws": 0, "level": 0.95, "splits": 400, "seed": 0}
     model = Model(MODEL, ["x", "v"], None, rule, np.zeros(2), {}, **options)
-    sections, _ = _marched(drawn, model, "rho", grid, ["up"], 0.0)
+    (slot,) = carried(drawn, model, "rho", grid, ["up"])
     for i, rho in enumerate(grid):
         alone = ns.poincare(base.with_parameters(rho=rho, g=rho / 10 + 2e-3), n=1, transient=600)["section"].values
-        np.testing.assert_allclose(sections[0, i, -1], alone[0], atol=1e-9)
+        np.testing.assert_allclose(slot.kept.section[i, -1], alone[0], atol=1e-9)
 
 
 @pytest.mark.parametrize(

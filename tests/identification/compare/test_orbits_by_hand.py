@@ -74,6 +74,16 @@ def test_returns_of_white_noise_are_one(drift: float, drifting: bool) -> None:
 def test_a_flip_lies_in_the_middle_of_what_nothing_tells() -> None:
     """2 up to 3.0, nothing at 4.0 to 6.0, 1 from 7.0 on: 5.0; with a stray on each side the same."""
     values = np.arange(12.0)
-    assert flips(values, [2, 2, 2, 2, 0, 0, 0, 1, 1, 1, 1, 1]) == {"1-2": 5.0}
-    assert flips(values, [2, 1, 2, 2, 0, 0, 0, 1, 1, 2, 1, 1]) == {"1-2": 5.0}
-    assert flips(values, [1, 1, 1, 1, 0, 0, 0, 2, 2, 2, 4, 4])["1-2"] == 5.0
+    assert flips(values, [2, 2, 2, 2, 0, 0, 0, 1, 1, 1, 1, 1]) == [("1-2", False, 5.0)]
+    assert flips(values, [2, 1, 2, 2, 0, 0, 0, 1, 1, 2, 1, 1]) == [("1-2", False, 5.0)]
+    assert flips(values, [1, 1, 1, 1, 0, 0, 0, 2, 2, 2, 4, 4]) == [("1-2", True, 5.0), ("2-4", True, 9.5)]
+
+
+def test_a_motion_that_is_doubled_in_the_middle_flips_twice() -> None:
+    """And one stray is no flip there and back, however many points the record has; two values are."""
+    values = np.arange(12.0)
+    assert flips(values, [1, 1, 1, 2, 2, 2, 2, 0, 1, 1, 1, 1]) == [("1-2", True, 2.5), ("1-2", False, 7.0)]
+    assert flips(values, [1, 1, 1, 1, 2, 1, 1, 1, 1, 1, 1, 1]) == []
+    assert flips(values, [1, 1, 1, 1, 2, 2, 1, 1, 1, 1, 1, 1]) == [("1-2", True, 3.5), ("1-2", False, 5.5)]
+    assert flips(values, [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2]) == [("1-2", True, 10.5)]
+    assert flips(values, [1, 1, 1, 1, 2, 2, 1, 1, 1, 1, 1, 1], least=3) == []

@@ -81,17 +81,18 @@ def test_flips_of_the_logistic_map() -> None:
     noise = np.array([1e-4])
     numbers = [measured_period(noisy(np.array(row)[:, None], i, noise), noise).number for i, row in enumerate(rows)]
     found = flips(rates, numbers)
+    first, second = found
     # Beyond the flip the points part as sqrt(r - 3): noise hides the first of them.
-    assert found["1-2"] == pytest.approx(3.0, abs=0.003)
-    assert found["2-4"] == pytest.approx(1 + np.sqrt(6), abs=0.003)
-    assert flips(rates[::-1], numbers[::-1]) == pytest.approx(found)
+    assert first == ("1-2", True, pytest.approx(3.0, abs=0.003))
+    assert second == ("2-4", True, pytest.approx(1 + np.sqrt(6), abs=0.003))
+    assert flips(rates[::-1], numbers[::-1]) == found
 
 
 def test_flips_are_found_from_either_side_and_through_gaps() -> None:
     values = np.arange(20.0)
     numbers = np.array([0, 0, 4, 4, 4, 0, 2, 2, 2, 2, 2, 0, 0, 1, 1, 1, 1, 2, 1, 1])
-    assert flips(values, numbers) == {"1-2": pytest.approx(11.5), "2-4": pytest.approx(5.0)}
-    assert flips(values, np.ones(20)) == {}
+    assert flips(values, numbers) == [("1-2", False, pytest.approx(11.5)), ("2-4", False, pytest.approx(5.0))]
+    assert flips(values, np.ones(20)) == []
 
 
 def test_window_along_a_slow_rise() -> None:

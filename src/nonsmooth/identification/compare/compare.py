@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.blas import one_blas_thread
+from nonsmooth.diagrams.response import forcing_parameter
 from nonsmooth.errors import check_keys
 from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
@@ -56,8 +57,9 @@ def compare(
       periods (and ``u_error``), as :func:`nonsmooth.identification.compare.motion_of` makes it of a sampled position,
       and ``measured_motion`` of a recording of the paper's rig; or its section points alone, ``section(iterate,
       state)``. It is compared in the states that were measured, one or more;
-    - a **response**: ``amplitude`` over ``run`` with the parameter (``omega``) and ``direction`` of each, or a result
-      of ``frequency_response``;
+    - a **response**: ``amplitude`` over ``run`` with the parameter (``omega``) and ``direction`` of each (up where not
+      given), or a result of ``frequency_response``. It is compared in one state, the first that it holds, or, where it
+      names none, the first of the theory: ``measured.sel(state="q2")`` takes another;
     - a **diagram**: ``section(<parameter>, iterate, state)`` of steady runs, or ``section(iterate, state)`` with the
       parameter over ``iterate`` for a slow rise.
 
@@ -82,7 +84,7 @@ def compare(
     noise : mapping or sequence, optional
         Standard error of a section point in each state; from ``section_error`` or ``u_error`` where not given.
     parameter : str, optional
-        The parameter of a response (``"omega"`` where not given) or of a diagram.
+        The parameter of a response (where not given as of :func:`nonsmooth.frequency_response`) or of a diagram.
     values : array, optional
         Of the predicted diagram; 201 over the measured range where not given.
     direction : {"up", "down", "both"}
@@ -113,7 +115,8 @@ def compare(
         ``theory_amplitude`` and its band over the parameter and ``direction``; ``measured_jump``, ``theory_jump``,
         ``jump_difference``, ``jump_tolerance`` over ``jump``; ``inside_band``.
 
-        *diagram*: ``measured_section`` over ``sample``, ``theory_section`` over the parameter; period numbers;
+        *diagram*: ``measured_section`` over ``sample``, ``theory_section`` over the parameter; period numbers; flips
+        of one kind (1-2 or 2-4, with the doubled motion on the same side) in pairs, nearest to each other:
         ``measured_flip``, ``measured_flip_error``, ``measured_flip_read``, ``theory_flip``,
         ``flip_relative_difference`` over ``flip``. Of a slow rise ``measured_flip`` is where the amplitude equation of
         a flip puts it, and the record itself reads ``measured_flip_read``, later by the delay; ``rise_per_return``.
@@ -153,7 +156,9 @@ def compare(
             measured = recorded_motion(measured, here, channels, run, told)
     kind, states = _kind(measured, parameter), _states(measured, theory)
     compare_units_of_readings(measured, units_of(theory))
-    spread = np.full(len(states), np.nan) if kind == "response" else _noise(measured, noise, states)
+    if kind == "response":
+        states = states[:1]
+    spread = np.full(1, np.nan) if kind == "response" else _noise(measured, noise, states)
     solver = solver_of(options)
     rest: dict[str, Any] = {key: value for key, value in options.items() if key not in solver}
     model = Model(theory, states, parameters, set_, spread, solver, **rest)
@@ -165,7 +170,7 @@ def compare(
         **options,
     }
     if kind != "motion":
-        name = parameter or ("omega" if kind == "response" else _swept(measured))
+        name = parameter or (_forcing(theory) if kind == "response" else _swept(measured))
         if model.system is not None:
             check_parameter(name, model.theory)
     if kind == "response":
@@ -242,6 +247,15 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
     if values.shape != (len(states),) or not (values > 0).all():
         raise ValueError(f"noise must be a positive number for each of {', '.join(states)}; got {values.tolist()}")
     return values
+
+
+def _forcing(theory: Any) -> str:
+    """The parameter of a response: that of a theory at hand, or that of a System which sets the forcing period."""
+    if isinstance(theory, System):
+        return forcing_parameter(theory)
+    held = theory["amplitude"].dims if "amplitude" in theory else ()
+    others = [str(dim) for dim in held if dim not in ("state", "direction", "start")]
+    return others[0] if len(others) == 1 else "omega"
 
 
 def _swept(measured: xr.Dataset) -> str:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from threading import Event
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
-from nonsmooth.attractors.settled import usable
-from nonsmooth.diagrams.sweep_pieces import Slot
 from nonsmooth.identification.compare.draws import Model, intervals
-from nonsmooth.identification.compare.periods import MeasuredFlip, delayed_flips, flips, measured_period, period_numbers
-from nonsmooth.identification.compare.predict import Motions
+from nonsmooth.identification.compare.periods import (
+    Doubling,
+    MeasuredFlip,
+    delayed_flips,
+    flips,
+    measured_period,
+    period_numbers,
+)
+from nonsmooth.identification.compare.predict import carried
+from nonsmooth.identification.compare.response import nearest, nearest_alike
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
 
@@ -31,13 +35,15 @@ def compare_diagram(
     phase: float,
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
-    at, points, numbers = _measured(measured, name, model)
+    at, points, numbers, seen = _measured(measured, name, model)
     unit = measured[name].attrs.get("units", "1")
     grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, float)
     words = ["up", "down"] if direction == "both" else [direction]
 
     def diagram(system: System) -> tuple[FloatArray, IntArray]:
-        return _marched(system, model, name, grid, words, phase)
+        slots = carried(system, model, name, grid, words, phase)
+        sections = np.stack([slot.kept.section[..., model.places] for slot in slots])
+        return sections, np.stack([slot.period_number for slot in slots])
 
     theory = model.theory
     if model.system is not None:
@@ -58,7 +64,7 @@ def compare_diagram(
         name: labelled(name, grid, name, unit),
         "direction": labelled("direction", np.array(words), "direction of the sweep"),
     }
-    drawn_flips: list[dict[str, float]] = []
+    drawn_flips: list[list[Doubling]] = []
     if model.system is not None and model.draws:
         systems, drawn = model.drawn()
         clouds = []
@@ -71,71 +77,64 @@ def compare_diagram(
                 (name, "state"), model.band(stack)[word], f"{word} edge of the section points for drawn parameters"
             )
         variables |= drawn
-    if name in measured["section"].dims:  # steady runs: a flip lies between two of them
-        seen = {word: MeasuredFlip(place, np.nan, place) for word, place in flips(at, numbers).items()}
-    else:
-        seen = delayed_flips(at, points, model.noise, numbers)
+    if name not in measured["section"].dims:
         variables["rise_per_return"] = labelled(
             (), (at[-1] - at[0]) / (len(at) - 1), f"rise of {name} per return", unit
         )
     return variables | _flips(seen, flips(grid, periods[0]), drawn_flips, unit, model)
 
 
-def _marched(
-    system: System, model: Model, name: str, grid: FloatArray, words: Sequence[str], phase: float
-) -> tuple[FloatArray, IntArray]:
-    """The diagram, the state carried along; settings that follow from the parameter change with it."""
-    rules = {key: setting for key, setting in model.settings.items() if setting.follows and key != name}
-    # A drawn system is off its rule by an error that stays the same along the diagram.
-    beside = {key: system.values[key] - rule.at(system.values) for key, rule in rules.items()}
-    systems = []
-    for value in grid:
-        here = {**system.values, name: float(value)}
-        systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
-    motions, rising = Motions(systems, model, phase), np.argsort(grid, kind="stable").tolist()
-    tables, rest = motions.settler.engine.prepare(motions.points), np.zeros(len(system.states))
-    slots = [Slot(motions.settler, motions.points, None, ()) for _ in words]
-    for word, slot in zip(words, slots, strict=True):
-        slot.march(tables, rising if word == "up" else rising[::-1], rest, True, lambda _: None, Event())
-        slot.kept.section[~usable(slot.status)] = np.nan
-    return np.stack([slot.kept.section[..., model.places] for slot in slots]), np.stack(
-        [slot.period_number for slot in slots]
-    )
-
-
-def _measured(measured: xr.Dataset, name: str, model: Model) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Values, points and period numbers, one row for each point: steady runs, or one slow rise."""
+def _measured(
+    measured: xr.Dataset, name: str, model: Model
+) -> tuple[FloatArray, FloatArray, IntArray, list[MeasuredFlip]]:
+    """Values, points and period numbers, one row for each point, and flips: of steady runs, or of one slow rise."""
     section = measured["section"]
     if name in section.dims:
-        stacked = section.transpose(name, "iterate", "state").values
+        stacked, values = section.transpose(name, "iterate", "state").values, measured[name].values.astype(float)
         numbers = [measured_period(one, model.noise, max_period=model.max_period).number for one in stacked]
+        seen = [MeasuredFlip(one.value, np.nan, one) for one in flips(values, numbers)]  # between two runs
         good = np.isfinite(stacked).all(axis=2)
-        at, found = (np.repeat(one, good.sum(axis=1)) for one in (measured[name].values.astype(float), numbers))
-        return at, stacked[good], found
+        at, found = (np.repeat(one, good.sum(axis=1)) for one in (values, numbers))
+        return at, stacked[good], found, seen
     points, at = section.transpose("iterate", "state").values, measured[name].values
     if at.shape != points.shape[:1]:
         raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
     good = np.isfinite(points).all(axis=1)
-    return at[good], points[good], period_numbers(points[good], model.noise, max_period=min(model.max_period, 8))
+    at, points = at[good], points[good]
+    found = period_numbers(points, model.noise, max_period=min(model.max_period, 8))
+    return at, points, found, delayed_flips(at, points, model.noise, found)
 
 
 def _flips(
-    measured: dict[str, MeasuredFlip], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, model: Model
+    measured: list[MeasuredFlip], theory: list[Doubling], drawn: list[list[Doubling]], unit: str, model: Model
 ) -> dict[str, Any]:
-    words = sorted({*measured, *theory})
-    nothing = MeasuredFlip(np.nan, np.nan, np.nan)
-    m, error, read = np.array([measured.get(word, nothing) for word in words], float).reshape(-1, 3).T
-    t = np.array([theory.get(word, np.nan) for word in words], float)
+    """Pair the flips of one kind: of one period number, with the doubled motion on the same side."""
+    read = [one.read for one in measured]
+    places, kinds = zip(*(([f.value for f in one], [f[:2] for f in one]) for one in (read, theory)), strict=True)
+    pairs = nearest_alike(*places, *kinds)
+    nothing = MeasuredFlip(np.nan, np.nan, Doubling("", False, np.nan))
+    rows = [
+        (one, theory[pairs[i]] if i in pairs else one.read._replace(value=np.nan)) for i, one in enumerate(measured)
+    ]
+    rows += [(nothing, one) for j, one in enumerate(theory) if j not in pairs.values()]
+    rows.sort(key=lambda row: (row[1].word, np.nanmin([row[0].read.value, row[1].value])))
+    m, error = np.array([row[0][:2] for row in rows], float).reshape(-1, 2).T
+    r, t = np.array([(row[0].read.value, row[1].value) for row in rows], float).reshape(-1, 2).T
     over = "flip"
     variables = {
-        "flip": labelled(over, np.array(words, str), "period numbers on the two sides of the flip"),
+        "flip": labelled(
+            over, np.array([row[1].word for row in rows], str), "period numbers on the two sides of the flip"
+        ),
         "measured_flip": labelled(over, m, "measured flip (NaN: none was seen)", unit),
         "measured_flip_error": labelled(over, error, "standard error of it", unit),
         "measured_flip_read": labelled(
-            over, read, "where the record changes its period number; in a rise later than the flip", unit
+            over, r, "where the record changes its period number; in a rise later than the flip", unit
         ),
         "theory_flip": labelled(over, t, "predicted flip (NaN: none is predicted)", unit),
         "flip_relative_difference": labelled(over, t / m - 1, "predicted over measured flip, minus 1"),
     }
-    table = [[one.get(word, np.nan) for word in words] for one in drawn]
+    table = [
+        [nearest([f.value for f in one if f[:2] == expected[:2]], expected.value) for _, expected in rows]
+        for one in drawn
+    ]
     return variables | intervals("theory_flip", over, table, unit, model.level)

@@ -36,6 +36,7 @@ from scipy.spatial.distance import cdist, pdist
 from nonsmooth.arrays import BoolArray, FloatArray
 
 FEWEST_SAMPLES = 8  # per forcing period: fewer do not show an orbit
+NEAREST = 0.25  # of the mean step: a cubic through samples nearer to each other magnifies their errors
 
 
 def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
@@ -66,12 +67,23 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
     at = first + np.arange((last - first) * grid) / grid
     good = np.isfinite(values).all(axis=1)
     turns, lost = turns[good], turns[~good]
-    folded = _cubic(turns, values[good], np.clip(at, turns[0], turns[-1])).reshape(-1, grid, values.shape[1])
+    far = _apart(turns, NEAREST / rate)
+    folded = _cubic(turns[far], values[good][far], np.clip(at, turns[0], turns[-1])).reshape(-1, grid, values.shape[1])
     step = np.diff(turns)[np.clip(np.searchsorted(turns, at), 1, len(turns) - 1) - 1]
     for missing in np.unique(np.floor(np.append(lost, at[step > 2 / FEWEST_SAMPLES])).astype(int) - first):
         if 0 <= missing < len(folded):
             folded[missing] = np.nan
     return folded
+
+
+def _apart(x: FloatArray, least: float) -> BoolArray:
+    """Choose samples of which none is less than ``least`` behind the one before."""
+    stay = np.ones(len(x), bool)
+    last = -1
+    for i in np.flatnonzero(np.diff(x) < least) + 1:
+        last = int(i) - 1 if stay[i - 1] else last
+        stay[i] = x[i] - x[last] >= least
+    return stay
 
 
 def _cubic(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:

@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray, IntArray
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 
 BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period is lost
 FEWEST_RETURNS = 4
@@ -91,28 +91,54 @@ def period_numbers(points: ArrayLike, noise: ArrayLike, *, window: int = 24, max
     return np.pad(numbers, (window // 2, window - 1 - window // 2), mode="edge").astype(np.int64)
 
 
-def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
-    """Values at which the period number doubles: ``{"1-2": value, "2-4": value}``.
+class Doubling(NamedTuple):
+    """A flip in a row of period numbers: ``word`` is ``1-2`` or ``2-4``; ``above``: the doubled motion lies above."""
+
+    word: str
+    above: bool
+    value: float
+
+
+STRAYS = 0.75  # of a change of the period number, in values on the wrong side: one value alone is no flip and back
+
+
+def flips(values: ArrayLike, numbers: ArrayLike, least: float = 1.0) -> list[Doubling]:
+    """Values at which the period number doubles, as many as there are, from period 1 on and from the lowest value on.
 
     Between the two numbers there may be values where none is found, 0 (the motion is slow near a flip, and passes
     through it with a delay when the parameter moves); the value given is the one that separates the two numbers with
-    the fewest points on the wrong side.
+    the fewest points on the wrong side. A number that returns after ``least`` points or fewer is no flip.
     """
     order = np.argsort(np.asarray(values, float), kind="stable")
     x, n = np.asarray(values, float)[order], np.asarray(numbers)[order]
-    found = {}
+    found = []
     for p in (1, 2):
         single, double = n == p, n == 2 * p
-        if not (single.any() and double.any()):
-            continue
-        below = double.sum() + np.concatenate([[0], np.cumsum(single.astype(int) - double)])
-        above = single.sum() + double.sum() - below
-        # `below`: misplaced points if doubles lie below the cut and singles above it; `above` the other way round.
-        wrong = below if below.min() <= above.min() else above
-        best = np.flatnonzero(wrong == wrong.min())  # a tie is cut in its middle
-        edges = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
-        found[f"{p}-{2 * p}"] = 0.5 * (edges[best[0]] + edges[best[-1]])
+        changes = _changes(single, double, STRAYS * least)
+        for first, at, last in zip([0, *changes], changes, [*changes[1:], len(x)], strict=False):
+            above = double[at:last].sum() > single[at:last].sum()
+            below, over = (one[first:last].astype(int) for one in ((double, single) if above else (single, double)))
+            # Points on the wrong side of each cut; a tie is cut in its middle.
+            wrong = over.sum() + np.concatenate([[0], np.cumsum(below - over)])
+            best = first + np.flatnonzero(wrong == wrong.min())
+            edges = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
+            found.append(Doubling(f"{p}-{2 * p}", bool(above), 0.5 * (edges[best[0]] + edges[best[-1]])))
     return found
+
+
+def _changes(single: BoolArray, double: BoolArray, price: float) -> list[int]:
+    """Places of the changes between the numbers that cost least: ``price`` each, 1 a point on the wrong side."""
+    cost, ways = np.zeros(2), []
+    for wrong in zip(double, single, strict=True):
+        came = cost > cost[::-1] + price  # it is cheaper to have come from the other number
+        ways.append(came)
+        cost = np.where(came, cost[::-1] + price, cost) + wrong
+    here, changes = int(cost[1] < cost[0]), []
+    for i in range(len(ways) - 1, 0, -1):
+        if ways[i][here]:
+            changes.append(i)
+            here = 1 - here
+    return changes[::-1]
 
 
 FEWEST = 12  # points with a splitting that can be seen
@@ -127,30 +153,29 @@ class MeasuredFlip(NamedTuple):
     ----------
     value, error : float
         The parameter at the flip and its standard error; NaN where the amplitude could not be followed.
-    read : float
+    read : Doubling
         Where the record itself changes its period number: later than the flip.
     """
 
     value: float
     error: float
-    read: float
+    read: Doubling
 
 
-def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers: IntArray) -> dict[str, MeasuredFlip]:
-    """The flips along a slow and even rise (or fall) of a parameter, ``{"1-2": MeasuredFlip, "2-4": ...}``.
+def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers: IntArray) -> list[MeasuredFlip]:
+    """The flips along a slow and even rise (or fall) of a parameter.
 
     ``at`` (n,) is the parameter at each section point, ``numbers`` (n,) its period number, by :func:`period_numbers`.
     """
-    return {word: _followed(at, points / noise, numbers, word, read) for word, read in flips(at, numbers).items()}
+    return [_followed(at, points / noise, numbers, read) for read in flips(at, numbers, STRAY)]
 
 
-def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, word: str, read: float) -> MeasuredFlip:
-    p = int(word.split("-")[0])
+def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, read: Doubling) -> MeasuredFlip:
+    p = int(read.word.split("-")[0])
     nothing = MeasuredFlip(np.nan, np.nan, read)
-    cut = int(np.argmin(np.abs(at - read)))
+    cut = int(np.argmin(np.abs(at - read.value)))
     # Time runs from the doubled side to the other (closing), or the other way round.
-    doubled = numbers == 2 * p
-    closing = doubled[max(cut - 4 * STRAY, 0) : cut].mean() > 0.5 if cut else False
+    closing = read.above == (at[-1] < at[0])
     order = slice(None, None, 1 if closing else -1)  # now the doubled side comes first
     where, cloud, known = at[order], points[order], numbers[order]
     cut = cut if closing else len(at) - 1 - cut

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from threading import Event
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler
+from nonsmooth.diagrams.sweep_pieces import Slot
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
@@ -98,6 +100,30 @@ class Motions:
         log = self.settler.engine.record(self.settler.engine.prepare(self.points[i : i + 1]), state, end, instants)
         check_complete(log, self.system, state, self.periods[i])
         return fold(instants / self.periods[i], log.sample_u[:, self.places], grid).reshape(periods * grid, -1)
+
+
+def carried(
+    system: System, model: Model, name: str, values: FloatArray, words: Sequence[str], phase: float = 0.0
+) -> list[Slot]:
+    """Steady motions along a parameter, the state carried along, one slot for each direction; NaN where a run failed.
+
+    Settings that follow from the parameter change with it.
+    """
+    rules = {key: setting for key, setting in model.settings.items() if setting.follows and key != name}
+    # A drawn system is off its rule by an error that stays the same along the parameter.
+    beside = {key: system.values[key] - rule.at(system.values) for key, rule in rules.items()}
+    systems = []
+    for value in values:
+        here = {**system.values, name: float(value)}
+        systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
+    motions, rising = Motions(systems, model, phase), np.argsort(values, kind="stable").tolist()
+    tables, rest = motions.settler.engine.prepare(motions.points), np.zeros(len(system.states))
+    slots = [Slot(motions.settler, motions.points, None, ()) for _ in words]
+    for word, slot in zip(words, slots, strict=True):
+        slot.march(tables, rising if word == "up" else rising[::-1], rest, True, lambda _: None, Event())
+        for kept in (slot.kept.section, slot.kept.high, slot.kept.low):
+            kept[~usable(slot.status)] = np.nan
+    return slots
 
 
 EXACT = 1e-6  # noise of a computed section point, in parts of the motion's size

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
-from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Model, intervals
+from nonsmooth.identification.compare.predict import carried
 from nonsmooth.identification.measured_units import units_of
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
@@ -94,14 +94,13 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         "jump_difference": labelled(over, t - m, "predicted minus measured jump", unit),
         "jump_tolerance": labelled(over, 0.5 * (own + step), "half steps of both", unit),
     }
-    nearest = [[_nearest(one.get(word, ()), jump.value) for word, _, jump in rows] for one in drawn]
-    return variables | intervals("theory_jump", over, nearest, unit, level)
+    table = [[nearest([one.value for one in of.get(word, ())], jump.value) for word, _, jump in rows] for of in drawn]
+    return variables | intervals("theory_jump", over, table, unit, level)
 
 
-def _nearest(jumps: Sequence[AmplitudeJump], value: float) -> float:
-    """The jump that is nearest to a value; NaN where there is none, or no value."""
-    near = min((jump.value for jump in jumps), key=lambda found: abs(found - value), default=np.nan)
-    return near if np.isfinite(value) else np.nan
+def nearest(found: Sequence[float], value: float) -> float:
+    """The number nearest to a value; NaN where there is none, or no value."""
+    return min(found, key=lambda one: abs(one - value), default=np.nan) if np.isfinite(value) else np.nan
 
 
 def nearest_alike(ours: Any, theirs: Any, our_kinds: Any, their_kinds: Any) -> dict[int, int]:
@@ -129,17 +128,21 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str) -> dict[s
     state = model.states[0]
     own, runs = units_of(model.theory)[state], _runs(measured, name, state)
     unit, at_runs = measured[name].attrs.get("units", "1"), np.full(len(runs["value"]), np.nan)
+    if others := sorted({*runs["direction"]} - {"up", "down"}):
+        raise ValueError(
+            "`direction` says of each run whether it was reached up or down (up where not given); got "
+            + ", ".join(others)
+        )
     directions = [word for word in ("up", "down") if (runs["direction"] == word).any()]
     parts = [runs["direction"] == word for word in directions]
 
     def predicted(system: System) -> tuple[FloatArray, FloatArray]:
         """The curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
         curves, at_runs = np.empty((len(values), len(directions))), np.full(len(runs["value"]), np.nan)
-        how: dict[str, Any] = {"transient": model.transient, "keep": 32, "progress": False, **model.solver}
         for d, (word, mine) in enumerate(zip(directions, parts, strict=True)):
             every = np.union1d(values, runs["value"][mine])
-            result = sweep(system, name, every, **how | {"direction": word})
-            heights = 0.5 * (result["maximum"] - result["minimum"]).sel(state=state).values
+            (slot,) = carried(system, model, name, every, [word])
+            heights = 0.5 * (slot.kept.high - slot.kept.low)[:, model.places[0]]
             curves[:, d] = heights[np.searchsorted(every, values)]
             at_runs[mine] = heights[np.searchsorted(every, runs["value"][mine])]
         return curves, at_runs
