@@ -76,3 +76,36 @@ def test_an_unknown_that_only_has_a_limit_on_one_side_says_so() -> None:
     assert "no parabola" in found.identifiability["static"]
     (profile,) = (one.data for one in found.findings if one.name == "static, profile")
     assert np.isnan(profile["low"]) and 1.4 < profile["high"] < 1.45
+
+
+def test_two_driven_records_of_a_chain_lead_to_the_least_minimum() -> None:
+    """From here windows four times as long at a time led both records to a minimum 5.6 standard uncertainties off."""
+    rig = ns.mechanical(
+        np.diag([1.0, 0.5]),
+        [["c", -0.05], [-0.05, 0.15]],
+        [["k", -4.0], [-4.0, 9.0]],
+        coordinates=["a", "b"],
+        parameters={"c": 0.3, "k": 9.0, "e": 0.6, "g": 0.25, "mu": 0.1},
+        forcing={"a": lambda t, p: p.f},
+        inputs=["f"],
+        elements={
+            "gap": ns.elements.Stop(at={"b": 1, "a": -1}, position="g", restitution="e"),
+            "rub": ns.elements.Coulomb(at="a", friction="mu"),
+        },
+    )
+    rng, ti, at = np.random.default_rng(0), np.linspace(0, 12, 241), np.linspace(0, 12, 601)
+    forces = [
+        6 * np.sin(2 * np.pi * (0.3 + 0.03 * ti) * ti),
+        5 * np.sign(np.sin(2.1 * ti)) * np.exp(-0.02 * ti),
+    ]
+    records = []
+    for force in forces:
+        run = ns.simulate(rig, duration=12, samples=at, inputs={"f": (ti, force)})
+        b = run.drop_duplicates("time", keep="last").sel(time=at, method="nearest").u.sel(state="b").values
+        records.append({"b": (at, b + 2e-3 * rng.standard_normal(len(at))), "load": (ti, force)})
+    first = rig.with_parameters(c=0.32, k=9.3, e=0.65, g=0.24, mu=0.12)
+    found = ns.fit(first, records, ["c", "k", "e", "g", "mu"], measured=["b"], inputs={"f": "load"}, progress=False)
+    for name in found:
+        assert abs(found[name] - rig.values[name]) < 3.5 * found.uncertainty[name], name
+    assert found.extra["b.noise"].value == pytest.approx(2e-3, rel=0.1)
+    assert not found.anomalies

@@ -42,6 +42,7 @@ _CHANCE = 1e-6  # that short windows fit so much better by chance
 _NO_CHANCE = 1e-3  # by derivatives at the fit over long ones: short ones need not be fitted to see that they do not
 _EXACT = 1e-4  # of the noise squared: residuals of short windows that are those of the arithmetic
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
+_FAST, _SLOW = (4.0, 2.0), (1.3, 2.0)  # by how much longer windows become at a time, and where another minimum is near
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
 
@@ -61,6 +62,8 @@ class Grown(Stage):
         Whether they have a structure that shows that the model is missing a part.
     stuck : bool
         Whether longer windows did not fit though neighbouring motions do not separate fast.
+    opened : bool
+        Whether short windows with starts of their own fit better than noise allows.
     begins : tuple of (int, int, float)
         Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
     doubted : tuple of int
@@ -72,6 +75,7 @@ class Grown(Stage):
     rms: float
     missing: bool = False
     stuck: bool = False
+    opened: bool = False
     begins: tuple[tuple[int, int, float], ...] = ()
     doubted: tuple[int, ...] = ()
 
@@ -143,29 +147,44 @@ def grow(
     """
     near = _at_once(problem, theta, start, free, longest)
     if near is not None:
-        if not _opens(near, length, start, free):
+        if _opened(near, length, start, free) is None:
             told()
             return near
-        theta = near.theta
+        near, theta = replace(near, opened=True), near.theta
     stage = settle_first(problem, theta, length, start, free)
     quiet = np.minimum(problem.noise, _noise(stage.problem, stage.state))
     if (quiet < _QUIET * problem.noise).any():  # few samples a swing: their irregularity was the motion's
         stage = settle_first(replace(problem, noise=quiet), stage.theta, length, start, free)
     told()
-    wide, poor, stuck = length, _reduced(stage) > POOR, False
-    while not poor and len(stage.problem.pieces) > len(problem.records) and wide < longest:
-        for wider in (min(factor * wide, longest) for factor in (4.0, 2.0)):
+    poor = _reduced(stage) > POOR
+    rounds = 2 if poor else _ROUNDS
+
+    def whole(stage: Stage, factors: tuple[float, float]) -> Grown:
+        stage, stuck = (stage, False) if poor else _lengthened(stage, length, longest, factors, told)
+        return replace(finished(stage, problem.noise, rounds), stuck=stuck)
+
+    found = whole(stage, _FAST)
+    if found.good and (opened := _opened(found, length, start, free)) is not None:
+        other = whole(opened, _SLOW)
+        best = other if other.rank < found.rank else found
+        found = replace(best, opened=best is found or _opened(best, length, start, free) is not None)
+    return found if near is None or found.rank < near.rank else near
+
+
+def _lengthened(
+    stage: Stage, wide: float, longest: float, factors: tuple[float, float], told: Callable[[], None]
+) -> tuple[Stage, bool]:
+    """The fit over windows that grow up to the longest ones, and whether they got stuck on the way."""
+    while len(stage.problem.pieces) > len(stage.problem.records) and wide < longest:
+        for wider in (min(factor * wide, longest) for factor in factors):
             longer = _longer_windows(stage, wider)
             told()
             if longer is not None:
                 stage, wide = longer, wider
                 break
         else:
-            stuck = _spreads(stage) < _REGULAR
-            break
-    rounds = 2 if poor else _ROUNDS
-    found = replace(finished(stage, problem.noise, rounds), stuck=stuck)
-    return found if near is None or found.rank < near.rank else near
+            return stage, _spreads(stage) < _REGULAR
+    return stage, False
 
 
 def finished(stage: Stage, irregular: FloatArray, rounds: int = _ROUNDS) -> Grown:
@@ -193,9 +212,9 @@ def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free
     return final if final.good and _spreads(found) < _CHAOS else None
 
 
-def _opens(whole: Grown, length: float, start: FloatArray | None, free: bool) -> bool:
-    """Return whether short windows with starts of their own fit better than noise allows (F-test of nested models):
-    then the sum of squares over long ones has another minimum, or the model lacks a part."""
+def _opened(whole: Grown, length: float, start: FloatArray | None, free: bool) -> Stage | None:
+    """The fit over short windows with starts of their own, where it is better than noise allows (F-test of nested
+    models): then the sum of squares over long ones has another minimum, or the model lacks a part."""
     from scipy.stats import f
 
     plain = whole.problem.plain
@@ -203,7 +222,7 @@ def _opens(whole: Grown, length: float, start: FloatArray | None, free: bool) ->
     stage, closed = Stage(now, whole.theta, now.starts), Stage(plain, whole.theta, whole.starts)
     (few, total), (many, all_) = _freedom(now), _freedom(plain)
     if total != all_ or not many > few:
-        return False
+        return None
 
     def chance(opened: float, shared: float = 1.0) -> float:
         """That noise alone lets them fit so much better."""
@@ -212,13 +231,15 @@ def _opens(whole: Grown, length: float, start: FloatArray | None, free: bool) ->
 
     least = foreseen(now, stage.theta, stage.starts)  # less than that of long windows, where derivatives are right
     if least < _reduced(closed) * many and chance(least / few) > _NO_CHANCE:
-        return False
+        return None
     try:
         opened = level(stage)
     except SolveError:
-        return False
-    shared = [correlation_times(np.concatenate(parts(now, opened.state, c))) for c in range(len(now.sensors))]
-    return chance(_reduced(opened), max(shared)) < _CHANCE
+        return None
+    residuals = [np.concatenate(parts(now, opened.state, c)) for c in range(len(now.sensors))]
+    if not np.isfinite(np.concatenate(residuals)).all():
+        return None
+    return opened if chance(_reduced(opened), max(map(correlation_times, residuals))) < _CHANCE else None
 
 
 def _longer_windows(stage: Stage, length: float) -> Stage | None:

@@ -376,6 +376,11 @@ def _anomalies(grown: Grown, data: xr.Dataset | None) -> list[str]:
             f"{', with a structure that no noise has' if grown.missing else ''}: the model does not describe this "
             f"record, least of all in {name} ({rms:.2f} times the mean); the uncertainties do not hold"
         )
+    elif grown.opened:
+        found.append(
+            "short windows with starts of their own fit better than noise allows: the fit is at another minimum than "
+            "that of the sum of squares over short windows, or the model lacks a part; the uncertainties do not hold"
+        )
     elif grown.problem.colour.any() and not grown.whole:
         found.append(
             "the residuals over windows with starts of their own correlate: the noise is coloured, or the model lacks "
