@@ -264,3 +264,16 @@ def test_laws_are_written_as_they_are_and_what_none_gives_by_its_value() -> None
         ("friction", "f(v)", False),
         ("stop", "e = 0", False),
     }
+
+
+def test_a_law_that_is_longer_than_its_gap_is_not_written() -> None:
+    """The names of functions count as the reader sees them: one wave is written, two waves would cover the masses."""
+
+    def gap(law):
+        values = {"A": 0.1, "B": 0.05, "d": 0.4, "w": 1.0, "phi": 0.5}
+        stop = E.ElasticStop(at="q", position=law, stiffness=2.0)
+        links = scheme_of(ns.mechanical(1, 0.1, 1, parameters=values, elements={"stop": stop})).links
+        return str(links[-1].words)
+
+    assert r"\cos" in gap(lambda t, u, p: p.d + p.A * np.cos(p.w * t))
+    assert gap(lambda t, u, p: p.d + p.A * np.cos(p.w * t + p.phi) + p.B * np.sin(2 * p.w * t - p.phi)) == ""
