@@ -210,11 +210,12 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
 def _look_at_instants(point: OrbitPoint) -> None:
     """Warn of transitions at one instant whose order matters to the multipliers (``saltation.of_one_instant``)."""
     shooting, times = point.shooting, point.once.times
-    last = np.flatnonzero(np.diff(times, append=np.inf) > INSTANT * point.period)
-    for i, j in zip([0, *(last[:-1] + 1).tolist()], last.tolist(), strict=True):
-        if j > i:
-            chain = [visit.transition for visit in shooting.signature.visits[i : j + 1]]
-            shooting.flow.jump(point.values, chain, float(times[i]), point.solved.segments.z[i])
+    first = 0
+    for last in np.flatnonzero(np.diff(times, append=np.inf) > INSTANT * point.period).tolist():
+        if last > first:
+            chain = [visit.transition for visit in shooting.signature.visits[first : last + 1]]
+            shooting.flow.jump(point.values, chain, float(times[first]), point.solved.segments.z[first])
+        first = last + 1
 
 
 def _why(shooting: Shooting, tried: Solved, name: str) -> tuple[str, str]:
