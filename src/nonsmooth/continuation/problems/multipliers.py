@@ -75,9 +75,10 @@ def distinct(mu: ComplexArray) -> list[complex]:
 
 
 def copies(mu: ComplexArray) -> bool:
-    """Return whether a multiplier other than zero stands more than once: parts of the system do the same, apart."""
+    """Return whether two multipliers or more, other than zero, stand more than once: masses that do the same, apart."""
     moving = mu[np.abs(mu) > SAME]
-    return len(distinct(moving)) < len(moving)
+    times = [np.count_nonzero(np.abs(moving - one) <= SAME * max(1.0, abs(one))) for one in distinct(moving)]
+    return sum(count > 1 for count in times) > 1
 
 
 def product_of_pairs(mu: ComplexArray) -> float:
