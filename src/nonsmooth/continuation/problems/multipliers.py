@@ -78,7 +78,7 @@ def copies(mu: ComplexArray) -> bool:
     """Return whether two multipliers or more, other than zero, stand more than once: masses that do the same, apart."""
     moving = mu[np.abs(mu) > SAME]
     times = [np.count_nonzero(np.abs(moving - one) <= SAME * max(1.0, abs(one))) for one in distinct(moving)]
-    return sum(count > 1 for count in times) > 1
+    return len([count for count in times if count > 1]) > 1
 
 
 def product_of_pairs(mu: ComplexArray) -> float:
