@@ -10,6 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.continuation.events.of_orbits import NeimarkSacker
+from nonsmooth.continuation.problems.multipliers import copies as is_of_copies
 
 pytestmark = pytest.mark.filterwarnings("ignore:multipliers of the orbit are equal:RuntimeWarning")
 E = ns.elements
@@ -220,3 +221,19 @@ def test_pairs_that_leave_the_unit_circle_together_change_the_sign() -> None:
         ]
         inside, outside = map(NeimarkSacker().number, points)
         assert inside * outside < 0.0
+
+
+@pytest.mark.parametrize(
+    ("mu", "are"),
+    [
+        ([0.5, 0.2, 0.5, 0.2], True),
+        ([0.1 + 0.2j, 0.1 - 0.2j] * 2, True),
+        ([1.0, 1.0 + 1e-8, 0.3, 0.3], True),
+        ([0.1 + 0.2j, 0.1 - 0.2j], False),
+        ([0.5, 0.5], False),  # a star node
+        ([0.0, 0.0, 0.3, 0.2], False),  # what friction holds
+        ([2e-6, 2.5e-6, 1e-6, 1.1e-6], False),
+    ],
+)
+def test_multipliers_of_copies(mu: list[complex], are: bool) -> None:
+    assert is_of_copies(np.array(mu, dtype=complex)) is are

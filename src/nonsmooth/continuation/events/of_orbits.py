@@ -54,7 +54,7 @@ from nonsmooth.continuation.march.event import (
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.equilibrium import Equilibria
-from nonsmooth.continuation.problems.multipliers import distinct, product_of_pairs, without_own
+from nonsmooth.continuation.problems.multipliers import copies, distinct, product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.primitive import is_doubled
 from nonsmooth.continuation.problems.rounds import INSTANT
@@ -132,7 +132,12 @@ class BranchPointOfOrbits(BranchPoint):
 
     def vanishing(self, step: Step) -> Callable[[Any], float]:
         """The bordered determinant, or the product over multipliers of which some stand more than once."""
-        return super().vanishing(step) if _once(step.a) is None else lambda point: float(_once(point) or np.nan)
+
+        def product(point: Any) -> float:
+            found = _once(point)
+            return np.nan if found is None else found
+
+        return super().vanishing(step) if _once(step.a) is None else product
 
     def named(self, step: Step, point: Any) -> Name:
         """The flip of the orbit of half the period, which ends the branch, or a crossing by its name."""
@@ -146,10 +151,9 @@ class BranchPointOfOrbits(BranchPoint):
 
 
 def _once(point: Any) -> float | None:
-    """The product of (mu - 1) over distinct multipliers; None where each stands once."""
+    """The product of (mu - 1) over distinct multipliers; None where no parts of the system are copies."""
     mu = without_own(point.multipliers, point.shooting.forced)
-    once = distinct(mu)
-    return float(np.prod(np.array(once) - 1.0).real) if len(once) < len(mu) else None
+    return float(np.prod(np.array(distinct(mu)) - 1.0).real) if copies(mu) else None
 
 
 class Flip(Event):

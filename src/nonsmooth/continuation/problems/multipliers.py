@@ -77,8 +77,8 @@ def distinct(mu: ComplexArray) -> list[complex]:
 def copies(mu: ComplexArray) -> bool:
     """Return whether two multipliers or more, other than zero, stand more than once: masses that do the same, apart."""
     moving = mu[np.abs(mu) > SAME]
-    times = [np.count_nonzero(np.abs(moving - one) <= SAME * max(1.0, abs(one))) for one in distinct(moving)]
-    return len([count for count in times if count > 1]) > 1
+    near = np.abs(moving[:, None] - moving) <= SAME * np.abs(moving)
+    return len(distinct(moving[near.sum(axis=0) > 1])) > 1
 
 
 def product_of_pairs(mu: ComplexArray) -> float:
