@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.continuation.events.of_orbits import NeimarkSacker
+from nonsmooth.continuation.events.special_orbits import NeimarkSacker
 from nonsmooth.continuation.problems.multipliers import copies as is_of_copies
 
 pytestmark = pytest.mark.filterwarnings("ignore:multipliers of the orbit are equal:RuntimeWarning")

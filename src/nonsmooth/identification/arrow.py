@@ -63,14 +63,25 @@ class Unsettled(SolveError):
         self.distance, self.step, self.values, self.starts = distance, step, values, starts
 
 
+class Eliminated(NamedTuple):
+    """A piece's start, eliminated: its step follows that of the piece's parameters; ``inverse @ inverse.T`` is its
+    covariance at given parameters."""
+
+    inverse: FloatArray
+    cross: FloatArray
+    part: FloatArray
+
+    def step(self, own: FloatArray) -> FloatArray:
+        """Its step with one of the piece's parameters."""
+        return self.inverse @ (self.part - self.cross @ own)
+
+
 def reduced(
     problem: Windows, state: Residuals, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
 ) -> tuple[Any, ...]:
     """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
 
-    By an orthogonal factorization of each piece: squares of a chaotic motion's derivatives lose all digits. For each
-    piece ``(inverse, cross, part)``: a start's step is ``inverse @ (part - cross @ step)``, its covariance at given
-    parameters ``inverse @ inverse.T``.
+    By an orthogonal factorization of each piece: squares of a chaotic motion's derivatives lose all digits.
     """
     J = state.of_alone.reshape(-1, p)
     normal, right = J.T @ J, J.T @ state.alone[: len(J)]
@@ -86,7 +97,7 @@ def reduced(
         table[: len(r)] = np.column_stack([s / size, g, r])
         table[range(len(r), len(r) + n), range(n)] = np.sqrt(_RIDGE**2 + damping)
         factor: Any = np.linalg.qr(table, mode="r")
-        back.append((np.linalg.inv(factor[:n, :n]) / size[:, None], factor[:n, n : n + m], factor[:n, n + m]))
+        back.append(Eliminated(np.linalg.inv(factor[:n, :n]) / size[:, None], factor[:n, n : n + m], factor[:n, n + m]))
         if used is None or used[i]:
             left, rest = factor[n:, n : n + m], factor[n:, n + m]
             left[:, np.linalg.norm(left, axis=0) < _TOLD * np.linalg.norm(g, axis=0)] = 0.0
@@ -140,7 +151,7 @@ def settle(
         said = f"the fit over {len(problem.pieces)} pieces did not settle{why}"
         return Unsettled(said, distance, rest, theta, starts)
 
-    def step_of(damping: float = 0.0) -> tuple[FloatArray, FloatArray, list[Any]]:
+    def step_of(damping: float = 0.0) -> tuple[FloatArray, FloatArray, list[Eliminated]]:
         """A step of the parameters, those at a bound against which the data push them being held; their covariance, and
         what gives the starts' steps."""
         normal, right, back = reduced(problem, state, weights, len(theta), used, damping)
@@ -160,9 +171,9 @@ def settle(
         parameters'."""
         step, covariance, back = step_of()
         far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
-        for i, (piece, (inverse, cross, part)) in enumerate(zip(problem.pieces, back, strict=True)):
-            error = np.linalg.norm(inverse, axis=1)
-            own = np.abs(inverse @ (part - cross @ step[piece.which])) / np.maximum(error, 1e-150)
+        for i, (piece, start) in enumerate(zip(problem.pieces, back, strict=True)):
+            error = np.linalg.norm(start.inverse, axis=1)
+            own = np.abs(start.step(step[piece.which])) / np.maximum(error, 1e-150)
             far.append(float(np.max(own)) if used is None or used[i] else 0.0)
         return np.array(far), step
 
@@ -172,8 +183,8 @@ def settle(
             step, _, back = step_of(damping)
             step = np.clip(theta + step, u.low, u.high) - theta
             moved = starts.copy()
-            for i, (inverse, cross, part) in enumerate(back):
-                moved[i] += inverse @ (part - cross @ step[problem.pieces[i].which])
+            for i, start in enumerate(back):
+                moved[i] += start.step(step[problem.pieces[i].which])
             found = cost(problem.residuals(theta + step, moved), theta + step)
             if np.isfinite(found) and found <= best * (1 + 1e-12):
                 break
@@ -211,7 +222,7 @@ class Sandwich(NamedTuple):
     reduced: float
     correlation: float
     normal: FloatArray
-    back: list[Any]
+    back: list[Eliminated]
 
 
 def sandwich(problem: Windows, theta: FloatArray, starts: FloatArray) -> Sandwich:

@@ -157,8 +157,9 @@ def compare(
     kind, states = _kind(measured, parameter), _states(measured, theory)
     compare_units_of_readings(measured, units_of(theory))
     if kind == "response":
-        states = states[:1]
-    spread = np.full(1, np.nan) if kind == "response" else _noise(measured, noise, states)
+        states, spread = states[:1], np.full(1, np.nan)
+    else:
+        spread = _noise(measured, noise, states)
     solver = solver_of(options)
     rest: dict[str, Any] = {key: value for key, value in options.items() if key not in solver}
     model = Model(theory, states, parameters, set_, spread, solver, **rest)

@@ -107,7 +107,8 @@ def flips(values: ArrayLike, numbers: ArrayLike, least: float = 1.0) -> list[Dou
 
     Between the two numbers there may be values where none is found, 0 (the motion is slow near a flip, and passes
     through it with a delay when the parameter moves); the value given is the one that separates the two numbers with
-    the fewest points on the wrong side. A number that returns after ``least`` points or fewer is no flip.
+    the fewest points on the wrong side. Fewer than 1.5 ``least`` points of another number between others are no
+    flip and back.
     """
     order = np.argsort(np.asarray(values, float), kind="stable")
     x, n = np.asarray(values, float)[order], np.asarray(numbers)[order]

@@ -73,23 +73,26 @@ def level(stage: Stage, used: Any = None) -> Stage:
     problem = stage.problem
     if not np.isfinite(np.concatenate([*stage.state.residuals, stage.state.alone])).all():
         raise SolveError("a motion over longer windows, or to a steady state, does not come to its end")
-    known = problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
-    return Stage(problem, *settle(problem, stage.theta, stage.starts, used, known, rough=True))
+    return Stage(problem, *settle(problem, stage.theta, stage.starts, used, _known(problem), rough=True))
 
 
 def foreseen(problem: Windows, theta: FloatArray, starts: FloatArray) -> float:
     """The sum of squared residuals over the noise to which derivatives lead from here, all starts free."""
-    state, u = problem.residuals(theta, starts, True), problem.unknowns
-    known = u.precision + np.diag(own_size(problem) ** -2.0)
+    state, known = problem.residuals(theta, starts, True), _known(problem)
     normal, right, back = reduced(problem, state, problem.weights(state), len(theta))
     if not np.isfinite(normal).all():
         return 0.0
-    step, found = inverted(normal + known)[0] @ (right - known @ (theta - u.centre)), 0.0
-    for i, (piece, (inverse, cross, part)) in enumerate(zip(problem.pieces, back, strict=True)):
+    step, found = inverted(normal + known)[0] @ (right - known @ (theta - problem.unknowns.centre)), 0.0
+    for i, (piece, start) in enumerate(zip(problem.pieces, back, strict=True)):
         own, n = step[piece.which], len(piece.readings[0])
-        left = state.residuals[i] - state.in_parameters[i] @ own - state.in_start[i] @ (inverse @ (part - cross @ own))
+        left = state.residuals[i] - state.in_parameters[i] @ own - state.in_start[i] @ start.step(own)
         found += float(np.sum((left[:n] / problem.noise[piece.readings[1]]) ** 2))
     return found if np.isfinite(found) else 0.0
+
+
+def _known(problem: Windows) -> FloatArray:
+    """The precision to which parameters are known on the way: to about their own size."""
+    return problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
 
 
 def own_size(problem: Windows) -> FloatArray:

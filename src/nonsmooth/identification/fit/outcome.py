@@ -342,16 +342,12 @@ def _ends(grown: Grown, data: xr.Dataset) -> list[str]:
 def _aliases(grown: Grown) -> list[str]:
     """A sentence on a fitted motion that swings faster than its readings show, at the records' beginnings."""
     problem, rng = grown.problem, np.random.default_rng(0)
-    counts = np.zeros((2, len(problem.sensors)))  # readings, swings
-    firsts = {
-        window.record: (window, start) for window, start in [*zip(problem.pieces, grown.starts, strict=True)][::-1]
-    }
-    for window, start in firsts.values():
+    counts, pairs = np.zeros((2, len(problem.sensors))), [*zip(problem.pieces, grown.starts, strict=True)]
+    for window, start in {window.record: (window, start) for window, start in pairs[::-1]}.values():
         if not (k := min(_SEEN, len(window.time) - 1)):
             continue
-        time = np.sort(
-            rng.uniform(window.time[0], window.time[k], _BETWEEN * k)
-        )  # at no rate, which could have aliases too
+        # At no rate, which could have aliases too.
+        time = np.sort(rng.uniform(window.time[0], window.time[k], _BETWEEN * k))
         fine = replace(window, time=time, values=np.zeros((len(time), counts.shape[1])))
         if (motion := problem.motion(grown.theta, fine, start)) is not None:
             predicted = problem.readings(grown.theta, fine, motion, False)[0].reshape(fine.values.shape)
@@ -379,7 +375,7 @@ def _anomalies(grown: Grown, data: xr.Dataset | None) -> list[str]:
     elif grown.opened:
         found.append(
             "short windows with starts of their own fit better than noise allows: the fit is at another minimum than "
-            "that of the sum of squares over short windows, or the model lacks a part; the uncertainties do not hold"
+            "theirs, or the model lacks a part; the uncertainties do not hold"
         )
     elif grown.problem.colour.any() and not grown.whole:
         found.append(
