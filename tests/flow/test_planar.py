@@ -357,6 +357,41 @@ def test_a_condition_on_what_is_identically_zero_does_not_hold() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("when", ["pull >= 0 and high > 0", "high > 0 and pull <= 0"])
+def test_a_condition_that_is_not_strict_holds_where_its_indicator_stays_zero(method: str, when: str) -> None:
+    """``pull`` is a x + (the speed of a mass at rest), with a = 0 nothing: the load comes each time sin t passes 1/2.
+
+    Past it the mass swings about -1/2 and, let go where it falls below -0.9, about 0 again. Of another pull the other
+    sign keeps it out."""
+    system = ns.System(
+        states=["x", "v", "still"],
+        parameters={"a": 0.0},
+        modes={
+            "free": lambda t, u, p: (u.v, -u.x, -u.still),
+            "loaded": lambda t, u, p: (u.v, -u.x - 0.5, -u.still),
+        },
+        indicators={
+            "pull": lambda t, u, p: p.a * u.x + u.still,
+            "high": lambda t, u, p: u.x - 0.5,
+            "low": lambda t, u, p: u.x + 0.9,
+        },
+        transitions=[
+            ns.Transition("free", "loaded", when=when),
+            ns.Transition("loaded", "free", when="low < 0 and pull >= 0"),
+        ],
+    )
+    run = ns.simulate(system, duration=16.0, start={"v": 1.0}, method=method, samples=3, **METHODS[method])
+    radius = np.hypot(1.0, np.sqrt(0.75))  # about -1/2, from x = 1/2 with v = sqrt(3)/2
+    low = np.pi / 6 + np.arccos(-0.4 / radius) + np.pi / 2 - np.arcsin(1.0 / radius)
+    wide = np.sqrt(0.81 + radius**2 - 0.16)  # about 0, from x = -0.9
+    again = low + 2 * np.pi - np.arccos(0.5 / wide) - np.arccos(-0.9 / wide)
+    assert run["crossing_time"].values[:3] == pytest.approx([np.pi / 6, low, again], abs=1e-12)
+    sign = 1.0 if ">= 0" in when else -1.0
+    other = ns.simulate(system.with_parameters(a=-sign), duration=9.0, start={"v": 1.0}, method=method, samples=3)
+    assert not other.sizes["crossing"]
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_a_kick_at_a_phase_comes_once_each_period(method: str) -> None:
     """v grows by K at a quarter of each period and x moves on straight lines; the mode stays the same."""
     kick, period = 0.4, 2.0

@@ -9,6 +9,7 @@ from nonsmooth.kernels.linear.tables import STATES, sizes_at, states_of, width_o
 from nonsmooth.kernels.linear.values import EPS, noise, rounding, slope_of, value_of
 
 TOGETHER = 1e-11 / (16.0 * EPS)  # in units of rounding: of one instant
+THROUGHOUT = 5  # in ``work.zero``: the indicator and all its derivatives vanish
 
 
 @inline
@@ -30,8 +31,8 @@ def flat(tables, mode, f, w, work):
 def vanishing(tables, mode, f, w):
     """(k, sign): the first derivative of functional f from the second on that is not zero within rounding at w.
 
-    Of those up to the fourth; (5, 0) where they vanish all. A harmonic's rounding is that of its phase, whatever its
-    value: a force that presses may be nothing else."""
+    Of those up to the fourth; (THROUGHOUT, 0) where they vanish all. A harmonic's rounding is that of its phase,
+    whatever its value: a force that presses may be nothing else."""
     n, m = states_of(tables.field), width_of(tables.field)
     tay = tables.tay
     for k in range(2, 5):
@@ -43,7 +44,7 @@ def vanishing(tables, mode, f, w):
                 size += fabs(tay[mode, f, j, k]) * (fabs(w[j]) if j <= n else 1.0)
         if fabs(total) > 64.0 * EPS * size:
             return k, 1 if total > 0.0 else -1
-    return 5, 0
+    return THROUGHOUT, 0
 
 
 @inline
@@ -70,6 +71,18 @@ def mark_zeros(tables, work, mode, fired):
                     zero[f] = 1
         if zero[f] != 0 and flat(tables, mode, f, w, work):
             zero[f], _ = vanishing(tables, mode, f, w)
+
+
+@inline
+def pass_on(tables, work, mode):
+    """Of what was known to be zero just before the present instant, keep what is so throughout."""
+    zero = work.zero
+    for f in range(zero.shape[0]):
+        stays = zero[f] == THROUGHOUT
+        if stays:
+            stays = fabs(value_of(tables, mode, f, work.w)) <= noise(tables, mode, f, tables.info[mode, 0], work.w)
+            stays = stays and flat(tables, mode, f, work.w, work) and vanishing(tables, mode, f, work.w)[1] == 0
+        zero[f] = THROUGHOUT if stays else 0
 
 
 @inline

@@ -13,6 +13,7 @@ then the condition's.
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline
+from nonsmooth.kernels.linear.limits import THROUGHOUT
 from nonsmooth.kernels.linear.polynomial import (
     NEVER,
     ONCE,
@@ -42,6 +43,13 @@ WIDTH = DEGREE + 1
 # Further places in ``work.found``: the functional that crossed last; whether all conditions are positive at a piece's
 # end; the sign of the section's functional where the leg begins.
 FUNCTIONAL, HELD, SIDE = 0, 2, 3
+
+
+@inline
+def holds_throughout(work, rows, r):
+    """Return whether row r is not strict (``>= 0``), and its indicator zero throughout."""
+    f = rows[r, 0]
+    return rows[r, 2] == 0 and f < work.zero.shape[0] and work.zero[f] == THROUGHOUT
 
 
 @inline
@@ -134,6 +142,8 @@ def finest(tables, work, mode, rows, lo, hi, node, up):
         moved = False
         for r in range(lo, hi):
             row = r - lo
+            if holds_throughout(work, rows, r):
+                continue
             if current != -2 - r and (r == current or horner(scr, row, tau) > 0.0):
                 continue
             if current >= lo and rises_with(tables, work, mode, rows[r, 0], row, tau):
@@ -192,8 +202,11 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
         n_once = 0
         once = lo
         a0 = a1 = r0 = r1 = 0.0
-        never = False
+        never = True  # nor what holds throughout, from when it was taken
         for r in range(lo, hi):
+            if holds_throughout(work, rows, r):
+                continue
+            never = False
             f = rows[r, 0]
             sign = float(rows[r, 1])
             g0, s0, g1, s1 = at_ends(tables, mode, f, w if size == NODES else wp, w1 if size == NODES else wq)
@@ -242,7 +255,8 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
                     behind = -1
                     for r in range(lo, hi):
                         if r != row and rows[r, 1] * value_of(tables, mode, rows[r, 0], end) <= 0.0:
-                            behind = r
+                            if not holds_throughout(work, rows, r):
+                                behind = r
                     if behind < 0:
                         break
                     row = behind

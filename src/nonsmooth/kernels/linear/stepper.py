@@ -10,9 +10,9 @@ from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import FIRED, MODE, NO_END, SOURCE, TIME, TRIES
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.build import build
-from nonsmooth.kernels.linear.limits import flat, sign_after
+from nonsmooth.kernels.linear.limits import flat, pass_on, sign_after
 from nonsmooth.kernels.linear.polynomial import NEVER, classify
-from nonsmooth.kernels.linear.search import FUNCTIONAL, SIDE, search
+from nonsmooth.kernels.linear.search import FUNCTIONAL, SIDE, holds_throughout, search
 from nonsmooth.kernels.linear.tables import NODES, STATES, states_of, width_of
 from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, noise, slope_of, turn, value_of, whole_step
 
@@ -106,6 +106,8 @@ def blocked(tables, work, mode, rows, lo, hi, h, w1, root):
         if f == root:
             g1 = 0.0
         if classify(g0, s0, g1, s1, h, bound_at(tables, work.row, mode, f, w)) == NEVER:
+            if holds_throughout(work, rows, r):
+                continue
             found = r
             break
     return found
@@ -166,8 +168,7 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
                 lost = lost or not fabs(w[r]) < 1e300
             if lost:
                 break
-        for f in range(work.zero.shape[0]):
-            work.zero[f] = 0
+        pass_on(tables, work, mode)
         whole_step(tables, work, mode)
     return s, whole, returns, first, patience
 
@@ -268,13 +269,12 @@ def time_scale(i, since, form, tables, work):
 def arrive_at(t, since, full, wrapped, form, net, tables, work):
     """State and phase at the end of a segment. Returns its transition."""
     m = width_of(tables.field)
-    w, w1, end, zero = work.w, work.w1, work.end, work.zero
+    w, w1, end = work.w, work.w1, work.end
     for j in range(m):
         w[j] = w1[j] if full else end[j]
     if wrapped:
         wrap_phase(tables, work, work.tally[MODE], work.memo[TIME])
-    for f in range(zero.shape[0]):
-        zero[f] = 0
+    pass_on(tables, work, work.tally[MODE])
     return t
 
 

@@ -121,7 +121,7 @@ def quiet(mode, n, h, slack, net, section, work):
         for r in range(net.row_start[k], net.row_start[k + 1]):
             i, sign = rows[r, 0], rows[r, 1]
             certain = _certain(J0, J1, n + i, float(sign), h, slack * scale[i])
-            if certain < 0:
+            if certain < 0 and (rows[r, 2] == 1 or J0[n + i, 0] != 0.0 or J1[n + i, 0] != 0.0):
                 side_next[i] = -sign
                 dead = True
                 break

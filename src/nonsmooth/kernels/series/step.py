@@ -63,7 +63,7 @@ def judged_at_end(mode, X, n, n_indicators, net, work):
     side, side_before = work.side, work.side_next
     for i in range(n_indicators):
         side_before[i] = side[i]
-        side[i] = 1 if X[n + i, 0] > 0.0 else -1
+        side[i] = 1 if X[n + i, 0] > 0.0 else (-1 if X[n + i, 0] < 0.0 else 0)
     for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
         k = net.mode_list[j]
         if rows_hold(k, net, side) and not rows_hold(k, net, side_before):
