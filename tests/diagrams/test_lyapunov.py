@@ -510,3 +510,31 @@ def test_a_chatter_that_ends_in_rest_loses_place_and_speed(restitution: float, r
     )
     exponents = ns.lyapunov(both, **options).exponents.values
     assert (exponents[2:] == -np.inf).all() and exponents[:2].sum() == pytest.approx(-0.1, abs=1e-10)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_an_order_of_two_impacts_that_matters_is_said(method: str) -> None:
+    """Equal masses strike together: with a spring between them the exponents are those of one alone and of the
+    difference, whose oscillator strikes in the same way; with a damper the map has a kink."""
+
+    def found(damping: float, **sweep: Any) -> xr.Dataset:
+        between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        system = ns.mechanical(
+            np.eye(2),
+            0.16 * np.eye(2) + damping * between,
+            0.81 * np.eye(2) + 0.5 * between,
+            parameters={"w": 1.47},
+            coordinates=["a", "b"],
+            forcing={name: (lambda t, p: 1.45 * np.cos(p.w * t)) for name in "ab"},
+            elements={f"s{name}": Stop(at=name, position=0.2, restitution=0.7) for name in "ab"},
+        )
+        return spectrum(system, start={"a": 0.05, "b": 0.05}, periods=64, transient=200, method=method, **sweep)
+
+    alone = found(0.0)
+    assert "note" not in alone.attrs
+    strikes = np.log(0.7) / (2 * np.pi / 1.47)  # once a period: lengths are multiplied by sqrt(e^2) and by exp(-c T/2)
+    assert alone.exponents.values.sum() == pytest.approx(-0.32 + 4 * strikes, abs=1e-9)
+    with pytest.warns(RuntimeWarning, match="happen at one instant.*those of one order"):
+        assert "do not hold for the other" in found(0.3).attrs["note"]
+    with pytest.warns(RuntimeWarning, match=r"at 2 of 2 values, 1\.47 the first"):
+        found(0.3, parameter="w", values=[1.47, 1.48])

@@ -118,7 +118,7 @@ def lyapunov(
 
     Of transitions at one instant each that the motion would have met there by itself has an instant of its own (two
     balls that bounce side by side); one to which another has led has that one's. Where both feel each other the
-    exponents are those for the order in which they were taken.
+    exponents are those for the order in which they were taken: a warning and the attribute ``note`` say so.
 
     A run that stops at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
     less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:
@@ -292,8 +292,18 @@ def _dataset(
 
 
 def _note(system: System, parameter: str | None, numbers: FloatArray | None, found: list[Spectrum]) -> str:
-    """The equilibria at which runs stayed, in sentences; unstable ones in a warning too."""
+    """The equilibria at which runs stayed, in sentences; unstable ones in a warning too, and an order that matters."""
     told = []
+    apart = [i for i, one in enumerate(found) if one.of_one_order]
+    if apart:
+        where = ""
+        if numbers is not None:
+            where = f" (at {len(apart)} of {len(found)} values, {numbers[apart[0]]:.6g} the first)"
+        told.append(
+            f"two transitions happen at one instant, each by itself{where}, and which of them a neighbouring motion "
+            "meets first matters: the exponents are those of one order, and do not hold for the other"
+        )
+        warnings.warn(f"lyapunov of {system.name!r}: {told[0]}", RuntimeWarning, stacklevel=4)
     for kind in EQUILIBRIA[1:]:
         which = [i for i, one in enumerate(found) if one.rest is not None and one.rest.kind == kind]
         if not which:

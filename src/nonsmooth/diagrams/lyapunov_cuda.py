@@ -39,7 +39,7 @@ def growth_on_gpu(
     -------
     growth : array (P, B, 2)
         Logarithms of the lengths divided out, by batch.
-    sums : array (P, 4)
+    sums : array (P, 6)
         Integral of div f, sum of log|det S|, crossings, least angle of a crossing.
     status : array (P,)
     """
@@ -72,7 +72,7 @@ def _batch(
         out = gpu.buffers(n, 1)
         jobs = gpu.run(jobs, states, wait - align - 1, 1, out)
         status[:] = out.status.copy_to_host()
-    frame, sums = to_device(np.tile(np.eye(2), (n, 1, 1))), to_device(np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
+    frame, sums = to_device(np.tile(np.eye(2), (n, 1, 1))), to_device(np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], (n, 1)))
     on_device, lengths = to_device(status), to_device(scale)
 
     def grow(jobs: IntArray, count: int, sums: Any) -> tuple[IntArray, FloatArray]:
@@ -97,7 +97,7 @@ def _batch(
             count -= some
         return jobs, growth.copy_to_host()
 
-    jobs, _ = grow(jobs, align, to_device(np.tile([0.0, 0.0, 0.0, 1.0], (n, 1))))
+    jobs, _ = grow(jobs, align, to_device(np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], (n, 1))))
     found = np.zeros((n, len(edges) - 1, 2))
     for batch, count in enumerate(np.diff(edges)):
         jobs, found[:, batch] = grow(jobs, int(count), sums)

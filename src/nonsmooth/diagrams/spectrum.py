@@ -13,6 +13,7 @@ Fractals 5 (1995) 1671-1681.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
 from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.sensitivity import apart, held
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.codes import UNBROKEN
@@ -46,6 +48,7 @@ class FrameGrowth:
     determinants: float  # sum of log|det S|
     nearest: float  # least |h'| / (|h_z| |f|) of all crossings
     status: int
+    beside: float = 0.0  # crossings, each at an instant of its own, that came with another
 
     @property
     def defect(self) -> float:
@@ -84,11 +87,12 @@ class Frame:
                 state.u[:], state.memory[:], state.clock[:] = before.u, before.memory, before.clock
                 state.counters[:], state.settled = before.counters, before.settled
                 continue
-            divergence, determinants, _, nearest, _ = record.sums.tolist()
+            divergence, determinants, _, nearest, _, beside = record.sums.tolist()
             total.logarithms[done : done + some, : record.growth.shape[1]] = record.growth
             total.divergence += divergence
             total.determinants += determinants
             total.nearest = min(total.nearest, nearest)
+            total.beside += beside
             if status != codes.OK:
                 total.status = status
             done += some
@@ -106,7 +110,7 @@ class Frame:
             self.Q,
             np.zeros((count, columns)),
             np.ones(columns),
-            np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
+            np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
             square,
             square.copy(),
             square.copy(),
@@ -195,6 +199,7 @@ class Spectrum:
     elapsed: float
     status: int
     rest: Equilibrium | None = None  # where the trajectory stays, or began
+    of_one_order: bool = False  # of transitions at one instant, where the other one's derivatives differ
 
 
 def spectrum_along(
@@ -238,7 +243,25 @@ def spectrum_along(
     found = evaluated(
         n, logs.mean(axis=0) / unit, batches, count, unit, growth.defect, growth.nearest, status, period is not None
     )
+    if growth.beside and order_matters(system, engine, values, state, unit * np.ceil(2 * count / growth.beside)):
+        found = replace(found, of_one_order=True)
     return at_rest(found, system, values, begun, state)
+
+
+def order_matters(system: System, engine: Engine, values: FloatArray, state: State, duration: float) -> bool:
+    """Return whether transitions at one instant of the motion from ``state`` on have an order that matters to small
+    changes (:func:`nonsmooth.flow.saltation.of_one_instant`)."""
+    state, flow = state.copy(), VariationalFlow.of(system)
+    state.clock[1] = 0.0
+    t, first = float(state.clock[0]), (int(state.counters[0]), np.concatenate([held(state.u), state.memory]))
+    log = engine.record(engine.prepare(values[None, :]), state, t + duration, np.zeros(0))
+    _, _, times, chains, before = apart(flow, log, first, t, (np.zeros(0), np.zeros(0, dtype=np.int64)))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for chain, instant, z in zip(chains, times[1:], before, strict=True):
+            if len(chain) > 1:
+                flow.jump(values, chain, instant, z)
+    return bool(said)
 
 
 def _hold(system: System, frame: Any, values: FloatArray, state: State) -> int:

@@ -224,7 +224,8 @@ class Growth(NamedTuple):
     growth: Any  # (units of time, n) logarithms
     lengths: Any  # (n,) not yet in ``growth``
     sums: Any  # integral of div f, sum of log|det S|, crossings, least |h'| / (|h_u| |u'|) of a crossing; in the series
-    # also what rounding has added to the first, in the exact flow the segments since the frame was orthonormal
+    # also what rounding has added to the first, in the exact flow the segments since the frame was orthonormal; of the
+    # crossings those at an instant of their own beside another's
     step: Any  # (n, n) the matrix of a leg or of the transitions of an instant
     reset: Any  # (n, n) the derivative of a transition's map
     matrix: Any  # (n, n) scratch

@@ -121,6 +121,7 @@ def meet_again(t, mode, net, seen, tables, before):
     for j in range(n):
         change += tables.fun[mode, chosen, j] * (f[3, j] - f[0, j]) if chosen >= 0 else 0.0
     if change * rate > 0.0:
+        seen.sums[5] += 1.0
         for c in range(n):
             own[c] = 0.0
             for j in range(n):

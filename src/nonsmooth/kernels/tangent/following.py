@@ -79,5 +79,6 @@ def frame_across(follower, k, t, jumps):
             seen.fields[3, i] = seen.fields[0, i]
     else:
         steep = meet_again(equations.transitions[k, 2], seen.scale, seen, out)
+        seen.sums[5] += 1.0 if steep < inf else 0.0
     seen.sums[3] = min(seen.sums[3], steep)
     add(seen)
