@@ -392,6 +392,23 @@ def test_a_condition_that_is_not_strict_holds_where_its_indicator_stays_zero(met
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_a_start_from_which_modes_lead_back_to_each_other_is_refused(method: str) -> None:
+    """Between -1 and 1 both modes are left at once; the run began in one of them, against its own condition."""
+    relay = ns.System(
+        states=["x"],
+        parameters={"a": 1.0},
+        modes={"up": lambda t, u, p: (p.a,), "down": lambda t, u, p: (-p.a,)},
+        indicators={"high": lambda t, u, p: u.x + 1.0, "low": lambda t, u, p: u.x - 1.0},
+        transitions=[ns.Transition("up", "down", when="high > 0"), ns.Transition("down", "up", when="low < 0")],
+    )
+    for mode in ("up", "down"):
+        with pytest.raises(ns.SolveError, match="followed each other in ever shorter times"):
+            ns.simulate(relay, duration=5.0, start={"x": 0.0}, mode=mode, method=method, **METHODS[method])
+    above = ns.simulate(relay, duration=1.0, start={"x": 2.5}, mode="up", method=method, samples=2, **METHODS[method])
+    assert above["mode"].values[0] == 1 and above["u"].values[0] == [2.5]
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_a_kick_at_a_phase_comes_once_each_period(method: str) -> None:
     """v grows by K at a quarter of each period and x moves on straight lines; the mode stays the same."""
     kick, period = 0.4, 2.0

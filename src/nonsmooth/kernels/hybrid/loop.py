@@ -78,14 +78,14 @@ def next_holding(mode, tables, net, work):
 def settle(i, form, net, tables, work):
     """Start rule: transitions that hold already are taken, each mode at most once; so is an impact that begins there.
 
-    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface; PAUSED where
-    one waits for the tables of its mode."""
+    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface; CHATTER where
+    they lead back to a mode; PAUSED where one waits for the tables of its mode."""
     tally, visited = work.tally, work.visited
     for k in range(visited.shape[0]):
         visited[k] = 0
     visited[tally[MODE]] = 1
     for _ in range(visited.shape[0]):
-        mode, t = tally[MODE], -1
+        mode, t, again = tally[MODE], -1, False
         for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
             one = net.mode_list[k]
             if (
@@ -104,7 +104,10 @@ def settle(i, form, net, tables, work):
                 if visited[net.transitions[one, 0]] == 0 or (impact and net.transitions[one, 0] == mode):
                     t = one
                     break
+                again = True
         if t < 0:
+            if again:  # modes that lead back to each other at once
+                return CHATTER
             break
         tally[MODE] = take(i, t, -1, form, tables, net, work)
         tally[TAKEN] += 1
