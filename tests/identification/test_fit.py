@@ -279,14 +279,8 @@ def test_readings_of_which_the_model_has_no_motion_are_counted():
     assert any("readings are not used" in sentence for sentence in found.anomalies)
 
 
-@pytest.mark.parametrize(
-    ("name", "seed"),
-    [
-        pytest.param("impact damper", 1, marks=pytest.mark.slow),
-        pytest.param("relay feedback", 34, marks=pytest.mark.slow),
-        ("relief valve", 16),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seed"), [("impact damper", 1), ("relay feedback", 34), ("relief valve", 16)])
 def test_hidden_states_are_found_from_a_guess_far_off(name, seed, tmp_path):
     """No window of a part of a swing says where the ball is; short windows of the relay do not come to a minimum.
 

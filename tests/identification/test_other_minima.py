@@ -93,7 +93,7 @@ def test_two_driven_records_of_a_chain_lead_to_the_least_minimum() -> None:
             "rub": ns.elements.Coulomb(at="a", friction="mu"),
         },
     )
-    rng, ti, at = np.random.default_rng(0), np.linspace(0, 12, 241), np.linspace(0, 12, 601)
+    rng, ti, at = np.random.default_rng(0), np.linspace(0, 12, 241), np.linspace(0, 12, 301)
     forces = [
         6 * np.sin(2 * np.pi * (0.3 + 0.03 * ti) * ti),
         5 * np.sign(np.sin(2.1 * ti)) * np.exp(-0.02 * ti),

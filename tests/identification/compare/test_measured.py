@@ -301,7 +301,7 @@ def test_each_run_is_laid_at_the_phase_that_the_fit_found_of_it() -> None:
 
 def test_a_channel_is_read_by_the_sensor_and_the_clock_that_the_fit_found() -> None:
     """Two records of a resonance in closed form: of gains of their own, one offset, a delay and a slow clock."""
-    t, gains, noise = np.arange(0, 20, 0.1), {"a": 100.0, "b": -60.0}, 0.02
+    t, gains, noise = np.arange(0, 20, 0.2), {"a": 100.0, "b": -60.0}, 0.02
     system = ns.mechanical(
         1.0, "c", 9.0, parameters={"c": 0.15}, coordinates=["q"], forcing={"q": lambda t, p: np.cos(2.0 * t)}
     )
