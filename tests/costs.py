@@ -101,10 +101,11 @@ class Costs:
         return report
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
+    def pytest_runtest_protocol(self, item: pytest.Item, nextitem: pytest.Item | None) -> Any:
         self._watch_numba()
         begun = time.process_time()
         browser = bool({"browser", "page", "tab"} & set(getattr(item, "fixturenames", ())))
+        browser = browser or nextitem is None  # which ends with the session
         counting = self._count(_file(item.path), browser)
         next(counting)
         if self.into:
