@@ -233,3 +233,15 @@ def test_an_orbit_is_passed_once_whichever_forcing_period_its_section_lies_in() 
     inner = special["w"].values[np.abs(special["w"].values - at["grazing"].min()) > 1e-10]
     assert np.diff(np.sort(inner)).min() > 1e-9
     assert np.abs(special["w"].values - at["grazing"].min()).min() < 1e-9
+
+
+@pytest.mark.parametrize("low", [0.02, 0.03])
+def test_a_branch_stands_once_though_its_ends_are_rounded(low: float) -> None:
+    """An affine map has one fixed point; a branch ends at the edge of the range to rounding, on either side of it."""
+    affine = ns.Map(
+        states=["x", "y"],
+        parameters={"a": 0.3},
+        branches=[ns.Branch(lambda u, p: (p.a * u.x - 0.3 * u.y + 1.0, u.x))],
+    )
+    found = ns.bifurcation_diagram(affine, "a", (low, 0.6), n=5, depth=0)
+    assert found["period_number"].values.tolist() == [1]

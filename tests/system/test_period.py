@@ -107,3 +107,27 @@ def test_two_transitions_from_one_mode_at_one_phase_are_refused():
         System(**told, transitions=kicks)
     later = Transition("only", "only", at=0.5, reset=lambda t, u, p: (u.x + 2,))
     assert len(System(**told, transitions=[kicks[0], later]).transitions) == 2
+
+
+def test_every_reset_counts_though_transitions_have_one_label():
+    """Two walls of one mode: the first one gives a push that goes with the time, the second one does not."""
+
+    def between(push, **more):
+        return System(
+            states=["x", "v"],
+            parameters={"w": 3.0, "e": 0.8},
+            modes={"only": lambda t, u, p: (u.v, -u.x)},
+            indicators={"right": lambda t, u, p: u.x - 1, "left": lambda t, u, p: u.x + 1},
+            transitions=[
+                Transition("only", "only", when="right > 0", reset=lambda t, u, p: (u.x, -u.v - push(t, p))),
+                Transition("only", "only", when="left < 0", reset=lambda t, u, p: (u.x, -p.e * u.v)),
+            ],
+            **more,
+        )
+
+    assert between(lambda t, p: 0.1 * np.cos(p.w * t)).period() == pytest.approx(2 * np.pi / 3)
+    assert between(lambda t, p: 0.1 * t).explicit_time
+    with pytest.raises(SystemDefinitionError, match=r"the reset of only -> only \(v\) does not repeat"):
+        between(lambda t, p: 0.1 * np.cos(p.w * t), period=lambda p: np.pi / p.w)
+    with pytest.raises(SystemDefinitionError, match="w = 0"):
+        between(lambda t, p: 0.1 / p.w).with_parameters(w=0.0)

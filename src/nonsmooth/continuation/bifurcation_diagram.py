@@ -45,6 +45,9 @@ class _Branch:
         """Return whether a point of a sweep lies on it."""
         high, low = self.data["maximum"].values, self.data["minimum"].values
         size = np.maximum(np.nanmax(high, 0) - np.nanmin(low, 0), 1e-12)
+        nearest = float(np.clip(value, self.values.min(), self.values.max()))
+        if abs(nearest - value) <= SAME * np.ptp(self.values):  # an edge of the range, to rounding
+            value = nearest
         a, b = self.values[:-1], self.values[1:]
         at = np.flatnonzero(((a - value) * (b - value) <= 0.0) & (a != b))
         x = ((value - a[at]) / (b[at] - a[at]))[:, None, None]

@@ -305,8 +305,8 @@ def _with_period(
 ) -> tuple[Traced, bool]:
     """Return the system with its period, and whether it depends on the time without one."""
     expressions = timed_expressions(traced)
-    timed = any(traced.t in expression.free_symbols for expression in expressions.values())
-    found = forcing_period(tuple(expressions.values()), traced.t, values)
+    timed = any(traced.t in expression.free_symbols for _, expression in expressions)
+    found = forcing_period([expression for _, expression in expressions], traced.t, values)
     if given is None:
         period = found
     elif callable(given):

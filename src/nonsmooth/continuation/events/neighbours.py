@@ -175,7 +175,7 @@ def _leads_back(point: OrbitPoint, found: OrbitPoint) -> bool:
     if (found.value - point.value) * point.rise > 0.0:
         return False
     own = point.curve.at_parameter(point.Y, found.value)
-    return own is not None and _is_same(point, own, found)
+    return own is not None and not own.virtual and _is_same(point, own, found)
 
 
 def _came_by(point: OrbitPoint, found: OrbitPoint, passed: Sequence[OrbitPoint]) -> bool:

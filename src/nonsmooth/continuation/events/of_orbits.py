@@ -25,7 +25,13 @@ from nonsmooth.continuation.events.change import (
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
 from nonsmooth.continuation.events.sliding import TOUCHES, sliding_bifurcation
-from nonsmooth.continuation.events.special_orbits import BranchPointOfOrbits, Flip, FoldOfOrbits, NeimarkSacker
+from nonsmooth.continuation.events.special_orbits import (
+    BranchPointOfOrbits,
+    Flip,
+    FoldOfOrbits,
+    NeimarkSacker,
+    is_bare,
+)
 from nonsmooth.continuation.march.event import BESIDE, LARGEST, Met, Step, first_met, special_on
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.curve import Point
@@ -38,12 +44,14 @@ from nonsmooth.continuation.searches.settled import touching
 from nonsmooth.errors import SystemDefinitionError
 
 SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
+NOTHING = 1e-5  # of the first orbit's size: a cycle with transitions this small has vanished, as far as is computed
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
 NEARER = 60  # steps back to a boundary from the first orbit behind it, at most
 REACH = 60.0  # times the first of them: as far in all
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
+GROWS = 1e3  # times the first orbit's size: an orbit this large whose parameter stands grows beyond all bounds
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
     "range": "The branch reached the edge of the range.",
@@ -80,6 +88,11 @@ ENDINGS = {
     "homoclinic": (
         "The period grows beyond all bounds while states and parameter stand: the cycle ends in a homoclinic (or "
         "heteroclinic) orbit, a connection of equilibria beside which it waits ever longer."
+    ),
+    "boundary_equilibrium": "The cycle shrinks to an equilibrium on a boundary; continue_equilibrium follows that.",
+    "infinity": (
+        "The orbit grows beyond all bounds while the parameter stands: here what damps it balances what drives it "
+        "however large it is (a bifurcation at infinity, a resonance without damping)."
     ),
 }
 
@@ -152,10 +165,10 @@ class AlongOrbits(Policy):
         beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
         special, end = ([], None) if beyond is None else self._between(first.point, beyond)
         if beyond is None or not (_completes(met, beyond) or (end is not None and _completes([end], first.point))):
-            centre = beyond is None and _is_centre(first)
-            name = mark(found, met, beyond, end, "focus_centre" if centre else "")
+            vanishes = _vanishes(first) if beyond is None else ""
+            name = mark(found, met, beyond, end, vanishes)
             if beyond is None:
-                found.ending = name if centre else first.kind.ending or name
+                found.ending = vanishes or first.kind.ending or name
             elif is_doubled(beyond) and not is_doubled(first.point):
                 # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
                 found.ending = "branching"
@@ -191,16 +204,24 @@ class AlongOrbits(Policy):
         return found, None
 
     def over(self, point: OrbitPoint) -> str | None:
-        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``homoclinic`` where it only
-        grows longer: states and parameter stand, beside an equilibrium it waits for ever."""
-        shooting, along = point.shooting, np.abs(point.tangent)
-        if point.curve.swing(point) < SMALL:
+        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``infinity`` where an orbit grows
+        while the parameter stands, ``homoclinic`` where it only grows longer: states and parameter stand, beside an
+        equilibrium it waits for ever."""
+        shooting, along, swing = point.shooting, np.abs(point.tangent), point.curve.swing(point)
+        if is_bare(shooting) and swing < SMALL:
             return "equilibrium"
-        stands = along[-1] < WAITS**2 and along[: shooting.n].max() < WAITS
-        return "homoclinic" if not shooting.forced and stands and point.tangent[shooting.size - 1] > 0.0 else None
+        if not along[-1] < WAITS**2:
+            return None
+        if swing > GROWS:
+            return "infinity"
+        longer = not shooting.forced and point.tangent[shooting.size - 1] > 0.0
+        return "homoclinic" if longer and along[: shooting.n].max() < WAITS else None
 
     def why(self, point: OrbitPoint) -> str:
-        """Return ``physical`` where the equations do not allow the parameter ahead."""
+        """Return ``physical`` where the equations do not allow the parameter ahead, ``boundary_equilibrium`` where a
+        cycle has shrunk to nothing."""
+        if _is_nothing(point):
+            return "boundary_equilibrium"
         ahead = point.value + AHEAD * point.curve.width * float(np.sign(point.tangent[-1]))
         try:
             point.shooting.system.with_parameters({point.shooting.active[-1]: ahead})
@@ -246,14 +267,22 @@ def _but_completed(*sides: OrbitPoint) -> bool:
     return bool(rests) and words[0] == words[1]
 
 
-def _is_centre(met: Met) -> bool:
-    """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
+def _vanishes(met: Met) -> str:
+    """The name of a boundary where an autonomous orbit has shrunk to one point, or to a closed one of a linear mode."""
     point = met.point
     if point.shooting.forced:
-        return False
+        return ""
+    if _is_nothing(point):
+        return "boundary_equilibrium"
     system, name, width = point.shooting.system, point.shooting.active[0], point.curve.width
     free = [change.new.signature for change in met.kind.contacts(point) if not change.gained]
-    return any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
+    centre = any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
+    return "focus_centre" if centre else ""
+
+
+def _is_nothing(point: OrbitPoint) -> bool:
+    """Return whether an autonomous orbit has shrunk to one point."""
+    return not point.shooting.forced and point.curve.swing(point) < NOTHING
 
 
 def _in_family(point: OrbitPoint) -> OrbitPoint | None:

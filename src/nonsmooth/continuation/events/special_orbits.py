@@ -21,6 +21,7 @@ from nonsmooth.continuation.march.event import BranchPoint, Event, Fold, Name, S
 from nonsmooth.continuation.problems.multipliers import copies, distinct, product_of_pairs, without_own
 from nonsmooth.continuation.problems.primitive import is_doubled
 from nonsmooth.continuation.problems.rounds import INSTANT
+from nonsmooth.continuation.problems.shooting import Shooting
 
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
 NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
@@ -33,7 +34,13 @@ class FoldOfOrbits(Fold):
         """A Hopf point, which ends the branch, where the cycle is small."""
         if point.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the parameter too, without a multiplier 1
-        return ("hopf", "equilibrium") if point.curve.swing(point) < NOTHING else ("fold", None)
+        born = is_bare(point.shooting) and point.curve.swing(point) < NOTHING
+        return ("hopf", "equilibrium") if born else ("fold", None)
+
+
+def is_bare(shooting: Shooting) -> bool:
+    """Return whether orbits are autonomous and take no transition: those that emanate from a Hopf point."""
+    return not (shooting.forced or shooting.m)
 
 
 class BranchPointOfOrbits(BranchPoint):

@@ -196,9 +196,7 @@ class Orbits(Curve[OrbitPoint]):
         return self.rounds.shows(self.shooting, point.X, point.solved.values)
 
     def swing(self, point: OrbitPoint) -> float:
-        """The range of an autonomous orbit without transitions, in units of the first one's; else 1."""
-        if self.shooting.forced or self.shooting.m:
-            return 1.0
+        """The range of an orbit in units of that of the branch's first one: its largest state."""
         swing = (point.path.maximum - point.path.minimum) / self.first_size[: len(point.path.maximum)]
         return float(np.nanmax(swing))
 

@@ -220,8 +220,9 @@ class Walk:
                     barred = min(barred, -end[i, k])
             own[np.searchsorted(self.conditional, i)] = taken
         own[self.alone] = np.inf
-        if n_t and m > 1:
-            rest = np.where(self.elsewhere[:-1] & ~together[:-1], end[:-1], -np.inf)
+        if n_t and m > 1:  # of one instant are those whose condition vanishes there; one that holds was passed
+            meets = together[:-1] & (end[:-1] <= SOLVED * size.max(axis=0))
+            rest = np.where(self.elsewhere[:-1] & ~meets, end[:-1], -np.inf)
             other = rest.argmax(axis=1)
             others = rest[self.every[:-1], other]
         else:

@@ -92,9 +92,12 @@ class Rounds:
         forced = shooting.forced
         period = self.period_number * self.flow.period(values)[0] if forced else float(X[shooting.size - 1])
         ends = np.concatenate([[0.0], times, [period]])
-        i = int(np.diff(ends).argmax()) if forced else 0  # without forcing the section lies within a visit
+        lengths = np.diff(ends)
+        if not forced and len(times):  # the section lies within a visit, which may have become a short one
+            lengths[0], lengths[-1] = lengths[0] + lengths[-1], 0.0
+        i = int(lengths.argmax())
         begin = float(ends[i])
-        into = INTO * float(ends[i + 1] - begin) if forced else 0.0
+        into = INTO * float(lengths[i]) if forced or i else 0.0
         return i, begin + into, led(self.flow, values, shooting.modes[i], begin, into, states[i]), period
 
     def _run(

@@ -22,21 +22,20 @@ from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import Traced
 
 
-def timed_expressions(traced: Traced) -> dict[str, sp.Expr]:
-    """All expressions in which the time may occur, each with what it is."""
-    found: dict[str, sp.Expr] = {}
+def timed_expressions(traced: Traced) -> list[tuple[str, sp.Expr]]:
+    """All expressions in which the time may occur, each with what it is; several transitions may have one label."""
+    found: list[tuple[str, sp.Expr]] = []
     for mode, part in zip(traced.mode_names, traced.fields, strict=True):
-        found |= {
-            f"the vector field of mode {mode!r} ({state})": e for state, e in zip(traced.state_names, part, strict=True)
-        }
-    found |= {f"indicator {name!r}": e for name, e in zip(traced.indicator_names, traced.indicators, strict=True)}
+        named = zip(traced.state_names, part, strict=True)
+        found += [(f"the vector field of mode {mode!r} ({state})", e) for state, e in named]
+    found += [(f"indicator {name!r}", e) for name, e in zip(traced.indicator_names, traced.indicators, strict=True)]
     for jump in traced.transitions:
         if jump.reset is not None:
             named = zip(traced.state_names, jump.reset, strict=True)
-            found |= {f"the reset of {jump.label} ({state})": e for state, e in named}
-        found |= {f"what {jump.label} writes to {traced.memory_names[i]!r}": e for i, e in jump.writes}
+            found += [(f"the reset of {jump.label} ({state})", e) for state, e in named]
+        found += [(f"what {jump.label} writes to {traced.memory_names[i]!r}", e) for i, e in jump.writes]
     for name, row in zip(traced.output_names, traced.outputs, strict=True):
-        found |= {f"output {name!r} in mode {mode!r}": e for mode, e in zip(traced.mode_names, row, strict=True)}
+        found += [(f"output {name!r} in mode {mode!r}", e) for mode, e in zip(traced.mode_names, row, strict=True)]
     return found
 
 
@@ -86,14 +85,14 @@ def _collect(e: sp.Expr, t: sp.Symbol, values: Mapping[sp.Symbol, float], found:
 
 
 def check_period(
-    traced: Traced, expressions: Mapping[str, sp.Expr], values: Sequence[float], period: float, given: str
+    traced: Traced, expressions: Iterable[tuple[str, sp.Expr]], values: Sequence[float], period: float, given: str
 ) -> None:
     """Raise unless every expression, by what it is, repeats after the ``period`` that was ``given``: numerically, at
     these parameters and fixed pseudo-random states and memory."""
     random = np.random.default_rng(5)
     t = random.uniform(0, 3 * period, 7)
     u, m = (random.uniform(0.1, 0.9, (7, len(some))) for some in (traced.u, traced.m))
-    for what, expression in expressions.items():
+    for what, expression in expressions:
         if traced.t not in expression.free_symbols:
             continue
         now, later = (numeric(traced, (expression,))(values, time, u, m)[:, 0] for time in (t, t + period))
@@ -133,14 +132,14 @@ class Domain:
 
     def __init__(self, traced: Traced, apart: Iterable[tuple[sp.Expr, str]] = ()) -> None:
         owned, period = timed_expressions(traced), traced.period
-        phases = {f"`at` of {jump.label}": jump.at for jump in traced.transitions if hasattr(jump.at, "free_symbols")}
-        owned |= phases if period is None else {"the forcing period": period, **phases}
+        phases = [(f"`at` of {jump.label}", jump.at) for jump in traced.transitions if hasattr(jump.at, "free_symbols")]
+        owned += phases if period is None else [("the forcing period", period), *phases]
         rules: dict[tuple[sp.Expr, str], str] = {}  # expression and kind -> what it belongs to
-        for owner, expression in owned.items():
+        for owner, expression in owned:
             for part, kind in _restricted(expression, set(traced.p)):
                 rules.setdefault((part, kind), owner)
         rules |= {} if period is None else {(period, "period"): ""}
-        rules |= {(phase, "phase"): owner for owner, phase in phases.items()}
+        rules |= {(phase, "phase"): owner for owner, phase in phases}
         self._rules = rules | {(expression, "apart"): message for expression, message in apart}
         self._expressions = tuple(expression for expression, _ in self._rules)
         self._allows = [_RULES[kind][0] for _, kind in self._rules]
