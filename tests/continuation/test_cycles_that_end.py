@@ -1,4 +1,4 @@
-"""Branches whose orbit grows beyond all bounds, or shrinks to an equilibrium on a boundary."""
+"""Branches whose orbit grows beyond all bounds, or shrinks to an equilibrium, on a boundary or in a Hopf point."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import nonsmooth as ns
 
@@ -89,3 +90,71 @@ def test_an_escapement_without_its_kick() -> None:
     assert orbit.floquet_multipliers.real == pytest.approx([1.0, np.exp(-2.0 * decay * turn)], abs=1e-9)
     branch = ns.continue_orbit(orbit, "K", (-1.0, 2.0))
     assert "shrinks to an equilibrium on a boundary" in str(branch["ended_because"].values[0])
+
+
+def test_a_branch_ends_in_the_hopf_point_wherever_it_was_begun() -> None:
+    """Two masses on a belt: of a cycle without size the tangent is noise, and beyond it are the same cycles."""
+
+    def slips(t, u, p):
+        friction = 0.8 / (1.0 + 2.0 * (p.belt - u.v))
+        return u.v, u.w, u.y - 2.0 * u.x - 0.05 * u.v + friction, (u.x - 1.5 * u.y - 0.05 * u.w) / 0.6
+
+    def growth(belt: float) -> float:
+        falls = 1.6 / (1.0 + 2.0 * belt) ** 2
+        A = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-2, 1, falls - 0.05, 0], [1 / 0.6, -2.5, 0, -0.05 / 0.6]])
+        return float(np.linalg.eigvals(A).real.max())
+
+    pair = ns.System(states=["x", "y", "v", "w"], parameters={"belt": 1.45}, modes={"slip": slips})
+    rest = ns.special_points(ns.continue_equilibrium(pair, "belt", (1.2, 1.6), start={"x": 0.2, "y": 0.1}))
+    cycles = ns.continue_orbit(rest.isel(special=0), range=(1.2, 1.6))
+    exact = brentq(growth, 1.4, 1.5, xtol=1e-14)
+    assert float(rest["belt"][0]) == pytest.approx(exact, abs=1e-12)
+    for k, high in ((11, 1.6), (15, 1.7), (33, 1.7)):
+        at = cycles.isel(point=k)
+        orbit = ns.find_orbit(pair.with_parameters(belt=float(at["belt"])), start=at["section"].values, transient=0)
+        branch = ns.continue_orbit(orbit, "belt", (1.2, high))
+        rows = ns.special_points(branch)
+        assert rows["kind"].values.tolist() == ["hopf"] and "shrinks to" in str(branch["ended_because"].values[0])
+        assert float(rows["belt"][0]) == pytest.approx(exact, abs=1e-6)
+
+
+def test_sliders_at_their_bounds_do_not_slip_again() -> None:
+    """Two springs with sliders in parallel (Iwan 1966) slip in another order on either side of F1 / k1 = F2 / k2.
+
+    Behind a turn each of them hangs at its bound, to rounding, on either side of it."""
+
+    def motion(first, second):
+        def rates(t, u, p):
+            force = 0.6 * np.cos(0.9 * t) - 0.5 * u.x - 0.02 * u.v - u.f1 - u.f2
+            return u.v, force, 0.3 * u.v if first == "s" else 0.0, 0.2 * u.v if second == "s" else 0.0
+
+        return rates
+
+    changes = []
+    for other in "spm":
+        for k, name in ((1, "{}" + other), (2, other + "{}")):
+            stick, plus, minus = ("m" + name.format(one) for one in "spm")
+            changes += [
+                ns.Transition(stick, plus, when=f"h{k} > 0"),
+                ns.Transition(stick, minus, when=f"l{k} < 0"),
+                ns.Transition(plus, stick, when="turn < 0"),
+                ns.Transition(minus, stick, when="turn > 0"),
+            ]
+    iwan = ns.System(
+        states=["x", "v", "f1", "f2"],
+        parameters={"F1": 0.15, "F2": 0.3},
+        modes={f"m{a}{b}": motion(a, b) for a in "spm" for b in "spm"},
+        indicators={
+            "turn": lambda t, u, p: u.v,
+            "h1": lambda t, u, p: u.f1 - p.F1,
+            "l1": lambda t, u, p: u.f1 + p.F1,
+            "h2": lambda t, u, p: u.f2 - p.F2,
+            "l2": lambda t, u, p: u.f2 + p.F2,
+        },
+        transitions=changes,
+    )
+    branch = ns.continue_orbit(ns.find_orbit(iwan), "F1", (0.05, 0.6))
+    rows = ns.special_points(branch)
+    assert rows["kind"].values.tolist() == ["corner"]
+    assert float(rows["F1"][0]) == pytest.approx(0.3 / 0.2 * 0.3, abs=1e-9)
+    assert all("edge of the range" in str(text) for text in branch["ended_because"].values)

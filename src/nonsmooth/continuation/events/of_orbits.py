@@ -43,8 +43,7 @@ from nonsmooth.continuation.problems.signature import AT_ONCE
 from nonsmooth.continuation.searches.settled import touching
 from nonsmooth.errors import SystemDefinitionError
 
-SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
-NOTHING = 1e-5  # of the first orbit's size: a cycle with transitions this small has vanished, as far as is computed
+NOTHING = 1e-5  # of the first orbit's size: a cycle this small has vanished, as far as is computed
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
@@ -153,6 +152,9 @@ class AlongOrbits(Policy):
     def behind(self, found: March, met: list[Met]) -> OrbitPoint | None:
         """Record a change of signature and begin anew behind it; None where the branch ends."""
         first = met[0]
+        if _is_nothing(first.point):
+            found.ending = mark(found, met, None, name="boundary_equilibrium")
+            return None
         if (after := section_passed(met)) is not None:
             return after
         if (family := _in_family(first.point)) is not None:
@@ -165,10 +167,10 @@ class AlongOrbits(Policy):
         beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
         special, end = ([], None) if beyond is None else self._between(first.point, beyond)
         if beyond is None or not (_completes(met, beyond) or (end is not None and _completes([end], first.point))):
-            vanishes = _vanishes(first) if beyond is None else ""
-            name = mark(found, met, beyond, end, vanishes)
+            centre = beyond is None and _is_centre(first)
+            name = mark(found, met, beyond, end, "focus_centre" if centre else "")
             if beyond is None:
-                found.ending = vanishes or first.kind.ending or name
+                found.ending = name if centre else first.kind.ending or name
             elif is_doubled(beyond) and not is_doubled(first.point):
                 # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
                 found.ending = "branching"
@@ -204,12 +206,9 @@ class AlongOrbits(Policy):
         return found, None
 
     def over(self, point: OrbitPoint) -> str | None:
-        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``infinity`` where an orbit grows
-        while the parameter stands, ``homoclinic`` where it only grows longer: states and parameter stand, beside an
-        equilibrium it waits for ever."""
+        """Return ``infinity`` where an orbit grows while the parameter stands, ``homoclinic`` where it only grows
+        longer: states and parameter stand, beside an equilibrium it waits for ever."""
         shooting, along, swing = point.shooting, np.abs(point.tangent), point.curve.swing(point)
-        if is_bare(shooting) and swing < SMALL:
-            return "equilibrium"
         if not along[-1] < WAITS**2:
             return None
         if swing > GROWS:
@@ -218,10 +217,10 @@ class AlongOrbits(Policy):
         return "homoclinic" if longer and along[: shooting.n].max() < WAITS else None
 
     def why(self, point: OrbitPoint) -> str:
-        """Return ``physical`` where the equations do not allow the parameter ahead, ``boundary_equilibrium`` where a
-        cycle has shrunk to nothing."""
+        """Return ``physical`` where the equations do not allow the parameter ahead, or that a cycle has shrunk to an
+        equilibrium, on a boundary where it has transitions."""
         if _is_nothing(point):
-            return "boundary_equilibrium"
+            return "equilibrium" if is_bare(point.shooting) else "boundary_equilibrium"
         ahead = point.value + AHEAD * point.curve.width * float(np.sign(point.tangent[-1]))
         try:
             point.shooting.system.with_parameters({point.shooting.active[-1]: ahead})
@@ -267,17 +266,14 @@ def _but_completed(*sides: OrbitPoint) -> bool:
     return bool(rests) and words[0] == words[1]
 
 
-def _vanishes(met: Met) -> str:
-    """The name of a boundary where an autonomous orbit has shrunk to one point, or to a closed one of a linear mode."""
+def _is_centre(met: Met) -> bool:
+    """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
     point = met.point
     if point.shooting.forced:
-        return ""
-    if _is_nothing(point):
-        return "boundary_equilibrium"
+        return False
     system, name, width = point.shooting.system, point.shooting.active[0], point.curve.width
     free = [change.new.signature for change in met.kind.contacts(point) if not change.gained]
-    centre = any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
-    return "focus_centre" if centre else ""
+    return any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
 
 
 def _is_nothing(point: OrbitPoint) -> bool:

@@ -34,13 +34,21 @@ class FoldOfOrbits(Fold):
         """A Hopf point, which ends the branch, where the cycle is small."""
         if point.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the parameter too, without a multiplier 1
-        born = is_bare(point.shooting) and point.curve.swing(point) < NOTHING
-        return ("hopf", "equilibrium") if born else ("fold", None)
+        return ("hopf", "equilibrium") if _is_born(point) else ("fold", None)
+
+    def confirmed(self, point: Any, was: float, now: float) -> bool:
+        """Return True for the birth of a cycle as well: of one without size the tangent is noise."""
+        return _is_born(point) or super().confirmed(point, was, now)
 
 
 def is_bare(shooting: Shooting) -> bool:
     """Return whether orbits are autonomous and take no transition: those that emanate from a Hopf point."""
     return not (shooting.forced or shooting.m)
+
+
+def _is_born(point: Any) -> bool:
+    """Return whether a cycle is so small that it emanates from where its parameter turns."""
+    return is_bare(point.shooting) and point.curve.swing(point) < NOTHING
 
 
 class BranchPointOfOrbits(BranchPoint):

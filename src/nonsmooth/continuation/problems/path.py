@@ -142,11 +142,14 @@ class Walk:
         # Visits whose length cannot vanish
         self.fixed = (ends[:-1] & ends[1:]) | self.at_once if m > 1 else np.array([True])
         self.crossed = np.zeros((m, len(traced.indicators)), dtype=bool)  # indicators zero where a visit begins
-        for i in range(1, m):
+        for i in [*range(1, m), 0, *range(1, m)]:  # the section parts a visit
             if self.at_once[i - 1]:
                 self.crossed[i] = self.crossed[i - 1]
             elif self.fired_row[i - 1] >= 0:
                 self.crossed[i] = surface == surface[self.net.rows[self.fired_row[i - 1], 0]]
+            if visits[i - 1].transition < 0 or jumps[visits[i - 1].transition].reset is None:
+                for one in np.flatnonzero(self.crossed[i - 1] & ~self.crossed[i]):
+                    self.crossed[i, one] = _stands(traced, int(self.modes[i - 1]), int(one))
         for i in map(int, np.flatnonzero(shooting.divided)):  # the exit lies in the surface of the entry
             self.crossed[i, self.net.rows[self.fired_row[i], 0]] = True
         # Of conditions that hold together the first is taken; what was crossed at the instant is zero.
@@ -306,6 +309,16 @@ def _surfaces(traced: Traced) -> tuple[IntArray, list[list[tuple[int, int, bool]
         for jump in traced.transitions
     ]
     return np.array([at for at, _ in same], dtype=np.int64), rows
+
+
+@lru_cache(maxsize=4096)
+def _stands(traced: Traced, mode: int, indicator: int) -> bool:
+    """Return whether an indicator keeps its value in a mode, whatever the state: a slider at its bound, a mass held."""
+    h = traced.indicators[indicator]
+    if traced.patterns is not None or traced.t in h.free_symbols:
+        return False
+    rates = zip(traced.u, traced.fields[mode], strict=True)
+    return bool(sum((h.diff(u) * rate for u, rate in rates if u in h.free_symbols), 0 * h).expand() == 0)
 
 
 def _in_net(traced: Traced, net: Any, k: int, row: int) -> tuple[int, int]:
