@@ -126,14 +126,14 @@ def test_sliders_at_their_bounds_do_not_slip_again() -> None:
     def motion(first, second):
         def rates(t, u, p):
             force = 0.6 * np.cos(0.9 * t) - 0.5 * u.x - 0.02 * u.v - u.f1 - u.f2
-            return u.v, force, 0.3 * u.v if first == "s" else 0.0, 0.2 * u.v if second == "s" else 0.0
+            return u.v, force, p.k1 * u.v if first == "s" else 0.0, p.k2 * u.v if second == "s" else 0.0
 
         return rates
 
     changes = []
-    for other in "spm":
-        for k, name in ((1, "{}" + other), (2, other + "{}")):
-            stick, plus, minus = ("m" + name.format(one) for one in "spm")
+    for k in (1, 2):
+        for other in "spm":
+            stick, plus, minus = (f"m{one}{other}" if k == 1 else f"m{other}{one}" for one in "spm")
             changes += [
                 ns.Transition(stick, plus, when=f"h{k} > 0"),
                 ns.Transition(stick, minus, when=f"l{k} < 0"),
@@ -142,7 +142,7 @@ def test_sliders_at_their_bounds_do_not_slip_again() -> None:
             ]
     iwan = ns.System(
         states=["x", "v", "f1", "f2"],
-        parameters={"F1": 0.15, "F2": 0.3},
+        parameters={"F1": 0.15, "F2": 0.3, "k1": 0.3, "k2": 0.2},
         modes={f"m{a}{b}": motion(a, b) for a in "spm" for b in "spm"},
         indicators={
             "turn": lambda t, u, p: u.v,
@@ -156,5 +156,5 @@ def test_sliders_at_their_bounds_do_not_slip_again() -> None:
     branch = ns.continue_orbit(ns.find_orbit(iwan), "F1", (0.05, 0.6))
     rows = ns.special_points(branch)
     assert rows["kind"].values.tolist() == ["corner"]
-    assert float(rows["F1"][0]) == pytest.approx(0.3 / 0.2 * 0.3, abs=1e-9)
+    assert float(rows["F1"][0]) == pytest.approx(1.5 * 0.3, abs=1e-9)
     assert all("edge of the range" in str(text) for text in branch["ended_because"].values)
