@@ -835,6 +835,19 @@ def test_a_parameter_that_was_not_fitted() -> None:
     assert found.get("m") is None
 
 
+def test_a_push_through_its_surface_is_told_of_the_two_modes_that_it_takes() -> None:
+    """An escapement that pushes in the middle: behind the push the condition of one mode holds again, without end."""
+    clock = ns.System(
+        states=["x", "v"],
+        parameters={"K": 1.0},
+        modes={"swing": lambda t, u, p: (u.v, -u.x - 0.1 * u.v)},
+        indicators={"middle": lambda t, u, p: u.x},
+        transitions=[ns.Transition("swing", "swing", when="middle > 0", reset=lambda t, u, p: (u.x, u.v + p.K))],
+    )
+    with pytest.raises(ns.SolveError, match="takes two modes, one on each side"):
+        ns.simulate(clock, duration=20.0, start=[-0.5, 0.1])
+
+
 def test_real_chatter_is_not_taken_for_a_wrong_sign() -> None:
     """A ball that comes to rest: the rates after its impacts point away from the floor."""
     ball = ns.System(

@@ -134,7 +134,7 @@ def wrong_way(system: System, log: TrajectoryLog) -> str:
             return (
                 f"The reset of {jump.label} leaves the state on its way on through the surface: d({name})/dt is "
                 f"{row.sign * before:.4g} before it and {row.sign * after:.4g} after it. Give the velocity that it "
-                "returns the other sign."
+                "returns the other sign; a push that leads on through its surface takes two modes, one on each side."
             )
     return ""
 

@@ -131,7 +131,8 @@ STATUSES: tuple[Status, ...] = (
         "Transitions followed each other in ever shorter times without end (an infinite number in finite time).",
         "Check the signs of the reset first: after it the state must move away from the surface. Where impacts do "
         "accumulate, write the stop as ns.elements.Stop, which ends them in rest, or a mode that sticks. Where two "
-        "modes lead straight back to each other without a reset, declare their surface as ns.Surface.",
+        "modes lead straight back to each other without a reset, one condition holds behind the other: give it a "
+        "second sign ('gap < 0 and rate < 0'), or declare their surface as ns.Surface.",
     ),
     Status(
         codes.TOO_MANY_CROSSINGS,
