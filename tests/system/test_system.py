@@ -318,6 +318,30 @@ def test_a_symmetry_may_exchange_modes():
     assert system.symmetry.shift == 0.5
 
 
+def test_latex_shows_what_transitions_write_and_no_state_that_is_gone():
+    """Memory is set as states are; a mode of fewer states has no value of the others."""
+    system = System(
+        states=["x", "v"],
+        parameters={"e": 0.8},
+        memory={"hit": 0.5},
+        modes={"free": lambda t, u, p: (u.v, -u.x + p.hit), "held": Mode(lambda t, u, p: (0.0,), states=["x"])},
+        indicators={"wall": lambda t, u, p: u.x - 1, "slow": lambda t, u, p: u.v - 0.1},
+        transitions=[
+            Transition(
+                "free",
+                "free",
+                when="wall > 0",
+                write={"hit": lambda t, u, p: 2 * u.v},
+                reset=lambda t, u, p: (u.x, -p.e * u.v),
+            ),
+            Transition("free", "held", when="slow < 0", reset=lambda t, u, p: (u.x,)),
+        ],
+    )
+    lines = system.to_latex().splitlines()
+    assert any(line.endswith(r"v^+ = - e v,\quad \mathrm{hit}^+ = 2 v \\") for line in lines)
+    assert lines[-2].endswith(r"h_{\text{slow}} < 0")
+
+
 def test_repr_and_latex_show_the_equations():
     system = discontinuous_support()
     text = repr(system)

@@ -151,13 +151,9 @@ def latex(system: System) -> str:
                 rf"h_{{{word(traced.indicator_names[row.indicator])}}} {sign} 0"
                 for row, sign in zip(jump.rows, signs, strict=True)
             )
-        lines.append(rf"{arrow} && {condition}")
-        if jump.reset is not None:
-            moved = [
-                rf"{names[symbol]}^+ = {write(e)}"
-                for symbol, e in zip(traced.u, jump.reset, strict=True)
-                if e != symbol
-            ]
-            lines[-1] += r",\quad " + r",\ ".join(moved)
+        reset = zip(traced.u, jump.reset or traced.u, traced.lacking[jump.target], strict=True)
+        after = [(symbol, e) for symbol, e, gone in reset if e != symbol and not gone]
+        after += [(traced.m[i], e) for i, e in jump.writes]
+        lines.append(rf"{arrow} && " + r",\quad ".join([condition, *(rf"{names[x]}^+ = {write(e)}" for x, e in after)]))
     body = " \\\\\n".join(lines)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
