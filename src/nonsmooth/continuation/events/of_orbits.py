@@ -50,7 +50,7 @@ AHEAD = 1e-6  # of the range
 NEARER = 60  # steps back to a boundary from the first orbit behind it, at most
 REACH = 60.0  # times the first of them: as far in all
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
-GROWS = 1e3  # times the first orbit's size: an orbit this large whose parameter stands grows beyond all bounds
+GROWS = 1e3  # times the first orbit's size and the states' scale: so large, while the parameter stands, it has no bound
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
     "range": "The branch reached the edge of the range.",
@@ -208,10 +208,10 @@ class AlongOrbits(Policy):
     def over(self, point: OrbitPoint) -> str | None:
         """Return ``infinity`` where an orbit grows while the parameter stands, ``homoclinic`` where it only grows
         longer: states and parameter stand, beside an equilibrium it waits for ever."""
-        shooting, along, swing = point.shooting, np.abs(point.tangent), point.curve.swing(point)
+        shooting, along = point.shooting, np.abs(point.tangent)
         if not along[-1] < WAITS**2:
             return None
-        if swing > GROWS:
+        if point.curve.swing(point, shooting.system.scale_vector()) > GROWS:
             return "infinity"
         longer = not shooting.forced and point.tangent[shooting.size - 1] > 0.0
         return "homoclinic" if longer and along[: shooting.n].max() < WAITS else None

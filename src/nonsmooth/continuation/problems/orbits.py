@@ -195,10 +195,10 @@ class Orbits(Curve[OrbitPoint]):
         """Return whether a simulated round of an orbit takes the transitions of the signature."""
         return self.rounds.shows(self.shooting, point.X, point.solved.values)
 
-    def swing(self, point: OrbitPoint) -> float:
-        """The range of an orbit in units of that of the branch's first one: its largest state."""
-        swing = (point.path.maximum - point.path.minimum) / self.first_size[: len(point.path.maximum)]
-        return float(np.nanmax(swing))
+    def swing(self, point: OrbitPoint, least: FloatArray | float = 0.0) -> float:
+        """The largest range of a state, in units of that of the branch's first orbit, but of ``least`` at least."""
+        size = np.maximum(self.first_size[: len(point.path.maximum)], least)
+        return float(np.nanmax((point.path.maximum - point.path.minimum) / size))
 
     def renewed(self, point: OrbitPoint) -> OrbitPoint | None:
         """The point in units of an orbit that has grown; or the phase condition of one without transitions put through
