@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -80,6 +81,20 @@ def test_ticks_times_unit_are_where_they_stand(high: float) -> None:
     assert len(said) > 3
     np.testing.assert_allclose(said * unit_of(ax, "m"), at, atol=1e-6 * high)
     np.testing.assert_array_equal(ax.lines[0].get_ydata(), [-high, high])  # the artist keeps the result's values
+
+
+@pytest.mark.parametrize(("unit", "high"), [("m", 2e-3), ("1", 2e-6)])
+def test_numbers_are_plain_text_and_their_factor_is_mathematics(unit: str, high: float) -> None:
+    """Unless TeX sets all text."""
+    with plot.journal():
+        ax = drawn(high)
+        name_axis(ax.yaxis, "$x$", unit)
+    ax.figure.canvas.draw()
+    said = [tick.get_text() for tick in ax.get_yticklabels()]
+    assert {"2", "\N{MINUS SIGN}2"} <= set(said) and not any("$" in word for word in said)
+    assert ("10^{" in ax.yaxis.get_offset_text().get_text()) == (unit == "1")
+    with mpl.rc_context({"text.usetex": True}):
+        assert ax.yaxis.get_major_formatter()(high) == r"$\mathdefault{2}$"
 
 
 @pytest.mark.usefixtures("window")

@@ -35,7 +35,9 @@ def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) ->
         The greatest magnitude among them; by default that of the axis' ends.
     """
     ticks, formatter = axis.major, axis.get_major_formatter()
-    ours = type(formatter) in (ScalarFormatter, _Prefixed)
+    if axis.get_scale() == "linear" and axis.isDefault_majfmt and type(formatter) is ScalarFormatter:
+        axis.set_major_formatter(formatter := _AsText())
+    ours = type(formatter) in (ScalarFormatter, _AsText, _Prefixed)
     if axis.get_scale() != "linear" or not ours or FIRST.match(unit) is None:
         axis.set_label_text(with_unit(name, unit))
         return
@@ -92,7 +94,18 @@ class _Ticks(Ticker):
                 axis.set_label_text(text.replace(f"({PREFIXES[old]}{unit})", f"({PREFIXES[power]}{unit})"))
 
 
-class _Prefixed(ScalarFormatter):
+class _AsText(ScalarFormatter):
+    """Numbers at the ticks as plain text, mathematics only the factor at the end of the axis.
+
+    The letters are the same, and a figure parses its formulas again with every measurement of its labels."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The number at a tick."""
+        text = super().__call__(x, pos)
+        return text if rcParams["text.usetex"] else text.removeprefix(r"$\mathdefault{").removesuffix("}$")
+
+
+class _Prefixed(_AsText):
     """Numbers in the unit that the axis' label names; without one the numbers themselves."""
 
     def __init__(self, unit: str) -> None:
