@@ -20,12 +20,11 @@ MAXIMA = ns.Poincare("lift_velocity", rising=False)
 START = {"y1": 0.2, "y2": 0.0, "y3": 10.0}
 
 
-def main() -> Axes:
+def main(points: int = 441) -> Axes:
     """Maxima of the lift over the inflow; the cycle at an inflow of 8 against the published numbers."""
     valve = ns.models.relief_valve()
-    diagram = ns.sweep(
-        valve, "q", np.linspace(4.0, 8.4, 441), direction="down", start=START, section=MAXIMA, keep=50, progress=False
-    )
+    q = np.linspace(4.0, 8.4, points)
+    diagram = ns.sweep(valve, "q", q, direction="down", start=START, section=MAXIMA, keep=50, progress=False)
     ax = ns.plot.bifurcation(diagram, y="y1", size=1.2)
     ax.set(xlabel="inflow, $q$ (dimensionless)", ylabel="maxima of the lift, $y_1$ (dimensionless)")
 

@@ -1,5 +1,7 @@
 """Apply small mistakes to the sources one by one and see that a test fails: ``python tests/mutants.py [part of name]``.
 
+``--tests FILE`` takes those that tests of that file are to catch.
+
 ``mutants.toml`` lists them: the file, the text and what it becomes, and the tests that state the fact. A mutant that
 all of them survive is a hole in the tests, and one whose text has moved says nothing: exit code 1. The sources
 themselves are not touched; a copy is.
@@ -7,6 +9,7 @@ themselves are not touched; a copy is.
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 import subprocess
@@ -51,8 +54,9 @@ def passes(tests: list[str], copy: Path) -> bool:
     return done.returncode == 0
 
 
-def main(wanted: str) -> int:
-    mutants = [one for one in tomllib.loads((HERE / "mutants.toml").read_text())["mutant"] if wanted in one["name"]]
+def main(wanted: str, file: str) -> int:
+    listed = tomllib.loads((HERE / "mutants.toml").read_text())["mutant"]
+    mutants = [one for one in listed if wanted in one["name"] and any(file in test for test in one["tests"])]
     survivors, moved = [], 0
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
@@ -78,4 +82,8 @@ def main(wanted: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else ""))
+    parser = argparse.ArgumentParser(description="apply small mistakes one by one and see that a test fails")
+    parser.add_argument("wanted", nargs="?", default="", help="a part of their names")
+    parser.add_argument("--tests", default="", metavar="FILE", help="those that tests of this file are to catch")
+    given = parser.parse_args()
+    sys.exit(main(given.wanted, given.tests))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import tomllib
+from collections.abc import Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -14,6 +15,15 @@ SOURCE = Path(__file__).parent.parent / "src"
 WITHOUT = ("nonsmooth.continuation",)
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """A node and all statements in it; nothing is imported in an expression."""
+    yield node
+    for part in ("body", "orelse", "handlers", "finalbody", "cases"):
+        inner = getattr(node, part, None)
+        for one in inner if isinstance(inner, list) else ():
+            yield from statements(one)
+
+
 @cache
 def imports(source: Path) -> dict[str, set[str]]:
     """The modules of a package that each of its modules imports, wherever the import stands."""
@@ -22,7 +32,7 @@ def imports(source: Path) -> dict[str, set[str]]:
     graph: dict[str, set[str]] = {}
     for name, path in files.items():
         graph[name] = set()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
                 graph[name].update(one.name for one in node.names)
             elif isinstance(node, ast.ImportFrom):

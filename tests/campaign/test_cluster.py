@@ -40,9 +40,9 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.Monke
 
 
 class Crew:
-    """Three worker processes of a run, each put back when it is gone, as a batch system would."""
+    """Worker processes of a run, each put back when it is gone, as a batch system would."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, size: int) -> None:
         self.command = [
             sys.executable,
             "-c",
@@ -56,7 +56,7 @@ class Crew:
             "0",
         ]
         self.environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HERE), *filter(None, sys.path)])}
-        self.members = [self._begin() for _ in range(3)]
+        self.members = [self._begin() for _ in range(size)]
         self.stop = threading.Event()
         self.thread = threading.Thread(target=self._watch)
         self.thread.start()
@@ -80,24 +80,26 @@ class Crew:
 
 
 @pytest.fixture
-def three_workers():
+def workers(request):
+    """A client and its crew; two unless a test says how many."""
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra `cluster`)")
     with (
         distributed.LocalCluster(n_workers=0, processes=True, dashboard_address=None, silence_logs=50) as found,
         distributed.Client(found) as client,
     ):
-        crew = Crew(client.scheduler.address)
+        size = getattr(request, "param", 2)
+        crew = Crew(client.scheduler.address, size)
         try:
-            client.wait_for_workers(3, timeout=120)
+            client.wait_for_workers(size, timeout=120)
             yield client, crew
         finally:
             crew.close()
 
 
-def test_a_cluster_computes_the_same(three_workers, tmp_path: Path) -> None:
+def test_a_cluster_computes_the_same(workers, tmp_path: Path) -> None:
     work = Squares()
-    assert right(run(work, client=three_workers[0], **QUIET), work)
-    assert right(run(work, client=three_workers[0], store=tmp_path / "far.zarr", **QUIET), work)
+    assert right(run(work, client=workers[0], **QUIET), work)
+    assert right(run(work, client=workers[0], store=tmp_path / "far.zarr", **QUIET), work)
     run(work, threads=1, store=tmp_path / "here.zarr", **QUIET)
     assert hashes(tmp_path / "far.zarr") == hashes(tmp_path / "here.zarr")
 
@@ -162,15 +164,16 @@ def disturbed(client, crew: Crew, path: Path, chunks: int, seconds: float, kills
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("workers", [3], indirect=True)
 @pytest.mark.parametrize(("chunks", "seconds", "kills", "client_kills"), [(60, 0.5, 4, 1)])
 def test_killed_workers_and_clients_change_nothing(
-    three_workers, tmp_path: Path, chunks: int, seconds: float, kills: int, client_kills: int
+    workers, tmp_path: Path, chunks: int, seconds: float, kills: int, client_kills: int
 ) -> None:
     if "NONSMOOTH_FAULTS" in os.environ:  # for example 400,1.0,30,2
         words = os.environ["NONSMOOTH_FAULTS"].split(",")
         chunks, seconds, kills, client_kills = int(words[0]), float(words[1]), int(words[2]), int(words[3])
     path = tmp_path / "disturbed.zarr"
-    made = disturbed(*three_workers, path, chunks, seconds, kills, client_kills)
+    made = disturbed(*workers, path, chunks, seconds, kills, client_kills)
     assert made == kills
     calm = tmp_path / "calm.zarr"
     run(Squares(size=7 * chunks), threads=1, store=calm, **QUIET)

@@ -13,12 +13,13 @@ import contextlib
 import io
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 #: Commands that have tests of their own; the second one serves a page until it is stopped.
 ELSEWHERE = ("reproduce", "explore")
+Shorter = Sequence[tuple[str, str, bool]]
 _BLOCK = re.compile(r"^```(python|toml|sh|text)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _GIVEN = re.compile(r"\{download\}`[^`<]*<([^>`]+)>`")
 _FILE = re.compile(r"^```\{code-block\} \w+\n:caption: (\S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -38,13 +39,11 @@ def blocks(text: str) -> list[tuple[str, str, str | None, int]]:
     return result
 
 
-def run_page(
-    page: Path, folder: Path, shorter: tuple[str, str] | None = None
-) -> Iterator[tuple[str, str, str | None, int]]:
+def run_page(page: Path, folder: Path, shorter: Shorter = ()) -> Iterator[tuple[str, str, str | None, int]]:
     """Run every block of a page in ``folder``, as the cells of a notebook.
 
-    Yields (what it printed or raised, what a notebook shows below it, what is expected, line). ``shorter``: text of one
-    block, and what stands in its place; of that block nothing is expected."""
+    Yields (what it printed or raised, what a notebook shows below it, what is expected, line). ``shorter``: texts,
+    what stands in their place, and whether the block prints the same; else nothing is expected of it."""
     names: dict[str, Any] = {"__name__": "page"}
     text = page.read_text(encoding="utf-8")
     for name in _GIVEN.findall(text):  # files that the page gives its reader
@@ -53,8 +52,9 @@ def run_page(
         for name, content in _FILE.findall(text):
             Path(name).write_text(content, encoding="utf-8")
         for language, code, expected, line in blocks(text):
-            if shorter is not None and shorter[0] in code:
-                code, expected = code.replace(*shorter), None
+            for old, new, same in shorter:
+                if old in code:
+                    code, expected = code.replace(old, new), expected if same else None
             if language == "python":
                 parsed = ast.parse("\n" * line + code, str(page))
                 yield *_python(parsed, str(page), names, may_raise=expected is not None), expected, line

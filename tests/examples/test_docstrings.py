@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ SOURCES = Path(__file__).parents[2] / "src" / "nonsmooth"
 WITH = (ast.Module, ast.ClassDef, ast.FunctionDef)
 
 
+@cache
 def examples(path: Path) -> list[doctest.DocTest]:
     """The examples of a file's docstrings, one list of lines for each."""
     found, parser = [], doctest.DocTestParser()

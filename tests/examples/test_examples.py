@@ -12,10 +12,11 @@ import pytest
 SMALL = {
     "basins": {"points": 40},
     "chart": {"points": 40},
-    "basin_fractions": {"points": 14, "starts": 60},
+    "basin_fractions": {"points": 14, "starts": 30},
     "element_loads": {"points": 41},
-    "real_silverbox": {"samples": 1000},
-    "three_masses": {"points": 25, "forces": 9},
+    "real_silverbox": {"samples": 600},
+    "relief_valve": {"points": 89},
+    "three_masses": {"points": 25, "forces": 3},
 }
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 

@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from page_code import blocks, run_page
+from page_code import Shorter, blocks, run_page
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts)
@@ -19,13 +19,40 @@ ELSEWHERE = {"recordings", "your_rig", "from_a_paper"}
 PAGES = [page for page in PAGES if page.stem not in ELSEWHERE and blocks(page.read_text(encoding="utf-8"))]
 LONGEST = 60  # lines of an output: in a notebook the next cell stays in sight
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-#: What a page of more than five seconds does in place of its own; what that block prints is compared where it does all.
+#: What pages do in place of their own in more than a second, and whether they print the same. The whole is marked slow.
 SHORTER = {
-    "a_bench": ("draws=60", "draws=12"),
-    "control_based_continuation": ("step=0.3, points=60", "step=0.3, points=3"),
-    "sketches_and_animations": ("seconds=5, rate=12", "seconds=0.5, rate=12"),
-    "smoothing": ("np.geomspace(1e-4, 1e-1, 7)", "np.geomspace(1e-4, 1e-1, 3)"),
-    "uncertainty": ("draws=60", "draws=12"),
+    "a_bench": [("draws=60", "draws=12", False)],
+    "control_based_continuation": [("step=0.3, points=60", "step=0.3, points=3", False)],
+    "elements": [
+        ('"mu", [0.1, 0.2, 0.4]', '"mu", [0.1, 0.2, 0.4], transient=100', True),
+        ("1.6, 21)", "1.6, 5)", True),
+    ],
+    "fit_your_own_model": [
+        ("6.4, 41)", "6.4, 15)", False),
+        ('settings={"0": {"rho": 0.0}},', 'settings={"0": {"rho": 0.0}}, tries=1,', False),
+    ],
+    "first_diagram": [
+        ("0.5, 601)", "0.5, 151)", True),
+        ("n = 601", "n = 7", True),
+        ("6.5, 0.01)", "6.5, 0.05)", False),
+    ],
+    "index": [("0.5, 601)", "0.5, 151)", True)],
+    "orbits_and_branches": [
+        ('"omega": (2.5, 8.0)', '"omega": (4.4, 6.0)', True),
+        ("range=(7.0, 10.0)", "range=(7.5, 8.6)", True),
+        ("length=4.0", "length=3.0", True),
+        ("(-0.0015, 0.002)", "(0.0003, 0.0016)", True),
+    ],
+    "safe_region": [
+        ("plane, loads=True,", "plane, loads=True, transient=100, keep=20,", True),
+        ("14.0, 121)", "14.0, 31)", True),
+    ],
+    "sketches_and_animations": [("seconds=5, rate=12", "seconds=0.5, rate=12", True)],
+    "smoothing": [
+        ("np.geomspace(1e-6, 1e-3, 7)", "[3e-5, 1e-4]", True),
+        ("np.geomspace(1e-4, 1e-1, 7)", "[3e-3, 1e-2]", True),
+    ],
+    "uncertainty": [("draws=60", "draws=12", False)],
 }
 LONG = [page for page in PAGES if page.stem in SHORTER]
 
@@ -38,7 +65,7 @@ def name_of(page: Path) -> str:
 def test_code_of_page(page: Path, tmp_path: Path) -> None:
     if 'os.environ["NONSMOOTH_DATA"]' in page.read_text(encoding="utf-8") and not os.environ.get("NONSMOOTH_DATA"):
         pytest.skip("NONSMOOTH_DATA names no folder with measurements of other laboratories")
-    judge(page, tmp_path, SHORTER.get(page.stem))
+    judge(page, tmp_path, SHORTER.get(page.stem, ()))
 
 
 @pytest.mark.slow
@@ -51,7 +78,7 @@ def test_first_file_of_the_page_on_recordings(tmp_path: Path) -> None:
     judge(ROOT / "docs" / "guides" / "recordings.md", tmp_path, blocks=2)
 
 
-def judge(page: Path, folder: Path, shorter: tuple[str, str] | None = None, blocks: int | None = None) -> None:
+def judge(page: Path, folder: Path, shorter: Shorter = (), blocks: int | None = None) -> None:
     import matplotlib.pyplot as plt
 
     checker = doctest.OutputChecker()

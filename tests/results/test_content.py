@@ -70,9 +70,23 @@ def datasets(draw: st.DrawFn) -> xr.Dataset:
     return xr.Dataset(variables, attrs={**draw(attributes), "nonsmooth": RECORD}).set_coords(coordinates)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+DRAWN: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck.function_scoped_fixture]}
+
+
+@settings(max_examples=8, **DRAWN)
 @given(result=datasets())
 def test_one_hash_through_memory_and_both_formats(result: xr.Dataset, tmp_path: Path) -> None:
+    has_one_hash(result, tmp_path)
+
+
+@pytest.mark.slow
+@settings(max_examples=100, **DRAWN)
+@given(result=datasets())
+def test_one_hash_of_many(result: xr.Dataset, tmp_path: Path) -> None:
+    has_one_hash(result, tmp_path)
+
+
+def has_one_hash(result: xr.Dataset, tmp_path: Path) -> None:
     for ending in FORMATS:
         path = save(result, tmp_path / f"r.{ending}")
         back = load(path)
