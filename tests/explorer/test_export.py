@@ -127,7 +127,7 @@ def test_views_that_do_not_move_in_a_file_say_so(results: dict[str, Any]) -> Non
 @pytest.mark.parametrize("view", ["branches", "spectrum"])
 def test_what_has_no_table_in_a_study_file_is_saved_as_the_script_that_makes_it(view: str, tmp_path: Path) -> None:
     shown = (
-        ns.bifurcation_diagram(SYSTEM, "rho", (0.26, 0.3), start=[0.0, 0.0], transient=100, progress=False)
+        ns.bifurcation_diagram(SYSTEM, "rho", (0.42, 0.5), start=[0.0, 0.0], transient=100, progress=False)
         if view == "branches"
         else ns.amplitude_spectrum(SYSTEM, **SHORT)
     )
@@ -140,8 +140,12 @@ def test_what_has_no_table_in_a_study_file_is_saved_as_the_script_that_makes_it(
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("py", "toml")])
-def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) -> None:
+def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from PIL import Image
+
+    if kind == "html":  # a tenth of its pictures, which the other moving file has all
+        whole = ns.animate
+        monkeypatch.setattr(ns, "animate", lambda run, seconds, **more: whole(run, seconds=seconds / 10, **more))
 
     begins = {
         "pdf": b"%PDF",

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 ACTIONS = int(os.environ.get("NONSMOOTH_ACTIONS", "1000"))
-FEW = 40  # actions of the run that is part of the suite
+FEW = 20  # actions of the run that is part of the suite
 #: Models that need no compiling beyond what the suite compiles anyway.
 MODELS = ("discontinuous_support", "impact_oscillator", "border_collision")
 TEXTS = ("0.3", "-1", "0", "1e400", "", "nan", "0,5", "drop table", "__import__('os')", "1e-9", "12")

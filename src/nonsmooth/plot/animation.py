@@ -238,7 +238,7 @@ class Animation(Answering):
         frames = []
         for image in self.images():
             file = io.BytesIO()
-            image.save(file, format="png", optimize=True)
+            image.save(file, format="png")
             frames.append(base64.b64encode(file.getvalue()).decode())
         name = f"a{uuid.uuid4().hex[:12]}"
         player = _PLAYER.replace("NAME", name).replace("LAST", str(len(frames) - 1))
