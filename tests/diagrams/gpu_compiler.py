@@ -35,28 +35,45 @@ def compiled(system: str, launched: dict[str, str], optimised: bool) -> None:
     Those that are not to be optimised end at the compiler's verifier: code is generated in the slow tests.
     """
     given = json.dumps([system, launched, optimised])
-    versions = [version(name) for name in ("numba-cuda", "nvidia-nvvm", "llvmlite")]
-    files = [Path(__file__), *(path for folder in TEXTS for path in sorted((SOURCES / folder).rglob("*.py")))]
-    key = hashlib.sha256(repr([given, versions, [path.read_text("utf-8") for path in files]]).encode()).hexdigest()
-    seen = cache_folder() / f"gpu_{system.replace(' ', '_')}_{'optimised' if optimised else 'verified'}"
-    if not seen.exists() or seen.read_text() != key:
+    if not done_before("sources", given, TEXTS, []):
         run([__file__], given)
+        done_before("sources", given, TEXTS, [], now=True)
+
+
+def done_before(what: str, given: str, folders: tuple[str, ...], modules: list[str], now: bool = False) -> bool:
+    """Return whether these kernels were compiled from the texts of folders, and from modules whose names are hashes of
+    their texts; ``now``: they were.
+    """
+    versions = [version(name) for name in ("numba-cuda", "nvidia-nvvm", "llvmlite")]
+    files = [Path(__file__), *(path for folder in folders for path in sorted((SOURCES / folder).rglob("*.py")))]
+    texts = [given, versions, modules, [path.read_text("utf-8") for path in files]]
+    key = hashlib.sha256(repr(texts).encode()).hexdigest()
+    system, _, optimised = json.loads(given)
+    seen = cache_folder() / f"gpu_{system.replace(' ', '_')}_{'optimised' if optimised else 'verified'}_{what}"
+    if now:
         seen.write_text(key)
+    return seen.exists() and seen.read_text() == key
 
 
 def main() -> None:
     from numba.cuda.cudadrv.nvvm import CompilationUnit
 
-    from nonsmooth.kernels.cuda.module import ptx_of, ptx_of_module
+    from nonsmooth.kernels.cuda.module import OBSERVERS, cuda_linear_module, ptx_of, ptx_of_module
 
     gc.disable()  # a compile makes millions of objects and hardly a cycle
-    system, launched, optimised = json.load(sys.stdin)
+    given = sys.stdin.read()
+    system, launched, optimised = json.loads(given)
     if not optimised:
         CompilationUnit.compile = lambda unit: b""  # called behind its verifier
     module = None if system == "linear" else series_module(system)
+    joined = [module] if module else [cuda_linear_module(*SHAPE, observer) for observer in OBSERVERS]
+    names = [one.__name__ for one in joined]
+    if done_before("modules", given, ("kernels",), names):  # another file of which kernels are made has changed
+        return
     for name, signature in launched.items():
         text = ptx_of_module(module, name, signature) if module else ptx_of(name, signature, SHAPE)
         assert not optimised or (text.count(".visible .entry") == 1 and ".target sm_90" in text), name
+    done_before("modules", given, ("kernels",), names, now=True)
 
 
 def series_module(name: str) -> Any:

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -50,7 +50,14 @@ attributes = st.dictionaries(
     st.one_of(words, numbers, hnp.arrays(st.sampled_from(["f8", "i4", "f4"]), st.integers(0, 4))),
     max_size=3,
 )
-types = st.sampled_from(["f8", "f4", "i1", "i2", "i4", "i8", "u1", "u8", "?", "c16", "c8", ">f8", "U"])
+TYPES = ["f8", "f4", "i1", "i2", "i4", "i8", "u1", "u8", "?", "c16", "c8", ">f8", "U"]
+types = st.sampled_from(TYPES)
+#: One of each type, with and without entries, and a name that is no ASCII.
+OF_EVERY_TYPE = xr.Dataset(
+    {f"{type}{n}": (("q", f"p{n}"), np.arange(3 * n).reshape(3, n).astype(type)) for type in TYPES for n in (0, 2)},
+    {"Ω": ((), 2.5, {"units": "s", "limits": np.array([1.0, -2.0])})},
+    {"nonsmooth": RECORD, "level": 0.95},
+)
 
 
 @st.composite
@@ -74,6 +81,7 @@ DRAWN: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck
 
 
 @settings(max_examples=8, **DRAWN)
+@example(result=OF_EVERY_TYPE)
 @given(result=datasets())
 def test_one_hash_through_memory_and_both_formats(result: xr.Dataset, tmp_path: Path) -> None:
     has_one_hash(result, tmp_path)
