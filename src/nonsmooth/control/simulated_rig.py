@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -178,7 +179,7 @@ class SimulatedRig:
             The simulation could not go on.
         """
         clock = self._state.clock
-        late = self.jitter * float(np.clip(self._rng.standard_normal(), -3.0, 3.0)) if self.jitter else 0.0
+        late = self.jitter * min(max(float(self._rng.standard_normal()), -3.0), 3.0) if self.jitter else 0.0
         wait = max(self._due + late - self._late, 0.0)
         self._late = late
         until = clock[1] * self._period + clock[0] + wait
@@ -199,4 +200,4 @@ class SimulatedRig:
     def reading(self, position: float) -> float:
         """Return what the sensor shows at a position."""
         shown = position + (self.noise * float(self._rng.standard_normal()) if self.noise else 0.0)
-        return self.resolution * float(np.floor(shown / self.resolution + 0.5)) if self.resolution else shown
+        return self.resolution * math.floor(shown / self.resolution + 0.5) if self.resolution else shown

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -47,9 +48,11 @@ def layers(traced: Traced) -> Layers:
 
     variables = frozenset({traced.t, *traced.u})
     finder = _Finder(variables)
-    modes = [finder.guards((*fields, *traced.indicators)) for fields in traced.fields]
+    expressions = [(*fields, *traced.indicators) for fields in traced.fields]
+    watched = {e: finder.guards(e) for e in dict.fromkeys(chain.from_iterable(expressions))}  # modes share most
+    modes = [list(dict.fromkeys(one for e in of_mode for one in watched[e])) for of_mode in expressions]
     count = max(map(len, modes))
-    if not any(finder.suspicious(e) for fields in traced.fields for e in (*fields, *traced.indicators)):
+    if not any(map(finder.suspicious, watched)):
         return Layers(traced, 0, False)
     rows = tuple(tuple(mode[i] if i < len(mode) else S.Zero for mode in modes) for i in range(count))
     names = tuple(f"guard_{i}" for i in range(count))
@@ -63,14 +66,9 @@ class _Finder:
     def __init__(self, variables: frozenset[Any]) -> None:
         self.variables = variables
 
-    def guards(self, expressions: tuple[Expr, ...]) -> list[Expr]:
-        """Arguments to be watched, each once, in an order that does not depend on hashes."""
-        found: dict[Expr, None] = {}
-        for e in expressions:
-            for part in self._parts(e):
-                for argument in self._arguments(part):
-                    found.update(dict.fromkeys(self._plain(argument)))
-        return list(found)
+    def guards(self, e: Expr) -> list[Expr]:
+        """Arguments to be watched, in an order that does not depend on hashes."""
+        return [one for part in self._parts(e) for argument in self._arguments(part) for one in self._plain(argument)]
 
     def suspicious(self, e: Expr) -> bool:
         """Return whether the expression holds anything to be watched, or a high power."""

@@ -295,11 +295,13 @@ class Engine(ABC):
         tally = system[3].tally
         n_c, n_t = tally[CROSSINGS], tally[TOUCHES]
         taken = [part[:n_c].copy() for part in crossings] if n_c else self._none[1]
-        by_time = np.argsort(touches[0][:n_t], kind="stable")  # those of a segment come by condition
-        touched = [part[by_time] for part in touches] if n_t else self._none[2]
+        touched = self._none[2]
+        if n_t:
+            by_time = np.argsort(touches[0][:n_t], kind="stable")  # those of a segment come by condition
+            touched = [part[by_time] for part in touches]
         log = TrajectoryLog(*(*sampled[1:], *taken, *touched, int(code)))
-        lacking, jumps = self.lacking == 1, self.traced.transitions
-        if lacking.any():
+        if self.lacking.any():
+            lacking, jumps = self.lacking == 1, self.traced.transitions
             log.sample_u[lacking[log.sample_mode] & (log.sample_mode >= 0)[:, None]] = np.nan
             log.u_before[lacking[[t.source for t in jumps]][log.crossing_transition]] = np.nan
             log.u_after[lacking[[t.target for t in jumps]][log.crossing_transition]] = np.nan

@@ -175,7 +175,7 @@ class Domain:
                 i = int(refused.argmax())
                 values = zip(self._traced.p, self._traced.parameter_names, points[i].tolist(), strict=True)
                 given = ", ".join(f"{name} = {value!r}" for p, name, value in values if p in expression.free_symbols)
-                text = expression.subs({s: sp.Symbol(n) for s, n in self._traced.named().items()})
+                text = expression.xreplace({s: sp.Symbol(n) for s, n in self._traced.named().items()})
                 says = _RULES[kind][1]
                 raise SystemDefinitionError(says.format(given=given, owner=owner, text=text, number=column[i]))
 
