@@ -18,7 +18,7 @@ class OwnRig:
 
     def __init__(self, per_turn=40, delay=0, sign=1.0, fault=None, fault_at=None, noise=1e-4, frequency=1.3, seed=0):
         self.step = 2 * math.pi / frequency / per_turn
-        self.substeps = max(1, math.ceil(60 / per_turn))
+        self.substeps = max(1, math.ceil(40 / per_turn))
         self.sign, self.fault, self.fault_at, self.noise = sign, fault, fault_at, noise
         self.rng = np.random.default_rng(seed)
         self.x = self.v = self.phase = self.force = 0.0
@@ -36,20 +36,24 @@ class OwnRig:
         if self.log:
             self.log[-1][3] = force
 
-    def rate(self, x, v, phase):
-        push = self.amplitude * math.cos(2 * math.pi * phase) + self.sign * self.force
-        return v, (push - DAMPING * v - STIFFNESS * x - CUBIC * x * x * x) / MASS
+    def push(self, phase):
+        return self.amplitude * math.cos(2 * math.pi * phase) + self.sign * self.force
 
     def read(self):
         h, turns = self.step / self.substeps, self.frequency * self.step / self.substeps / (2 * math.pi)
+        x, v, half, last = self.x, self.v, h / 2, self.push(self.phase)
         for _ in range(self.substeps):
-            x, v, p = self.x, self.v, self.phase
-            a1, b1 = self.rate(x, v, p)
-            a2, b2 = self.rate(x + h / 2 * a1, v + h / 2 * b1, p + turns / 2)
-            a3, b3 = self.rate(x + h / 2 * a2, v + h / 2 * b2, p + turns / 2)
-            a4, b4 = self.rate(x + h * a3, v + h * b3, p + turns)
-            self.x, self.v = x + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), v + h / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
-            self.phase = p + turns
+            first, middle, last = last, self.push(self.phase + turns / 2), self.push(self.phase + turns)
+            a = (first - DAMPING * v - STIFFNESS * x - CUBIC * x * x * x) / MASS
+            y, w = x + half * v, v + half * a
+            b = (middle - DAMPING * w - STIFFNESS * y - CUBIC * y * y * y) / MASS
+            z, s = x + half * w, v + half * b
+            c = (middle - DAMPING * s - STIFFNESS * z - CUBIC * z * z * z) / MASS
+            y, r = x + h * s, v + h * c
+            d = (last - DAMPING * r - STIFFNESS * y - CUBIC * y * y * y) / MASS
+            x, v = x + h / 6 * (v + 2 * w + 2 * s + r), v + h / 6 * (a + 2 * b + 2 * c + d)
+            self.phase += turns
+        self.x, self.v = x, v
         self.late = [*self.late[1:], self.x + self.noise * self.rng.standard_normal()]
         self.readings += 1
         shown = self.late[0]

@@ -204,17 +204,22 @@ def test_limits_that_are_none_are_answered(given, message):
         ns.Holding(**given)
 
 
-def test_under_noise_no_stable_motion_is_called_unstable_nor_the_reverse():
-    for seed in range(4):
+SEEDS = pytest.mark.parametrize("seeds", [range(2), pytest.param(range(4), marks=pytest.mark.slow)])
+
+
+@SEEDS
+def test_under_noise_no_stable_motion_is_called_unstable_nor_the_reverse(seeds):
+    for seed in seeds:
         branch, _, _ = held(OwnRig(20, 1, noise=3e-3, seed=seed), release=12)
         amplitude, seen = branch["amplitude"].values, branch["stability"].values
         # the fold, by the equations: 1.16305 rad/s at an amplitude of 0.6314
         assert (seen[amplitude < 0.53] != 0).all() and (seen[amplitude > 0.73] != 1).all()
 
 
-def test_the_amplitude_beside_a_fold_is_as_uncertain_as_it_says():
+@SEEDS
+def test_the_amplitude_beside_a_fold_is_as_uncertain_as_it_says(seeds):
     far, curve = [], None
-    for seed in range(4):
+    for seed in seeds:
         branch, _, _ = held(OwnRig(20, 1, seed=seed))
         beside = branch.isel(point=np.abs(branch["amplitude"].values - 0.6314) < 0.1)
         if curve is None:  # frequency over amplitude beside the fold, by the equations
@@ -230,4 +235,4 @@ def test_the_amplitude_beside_a_fold_is_as_uncertain_as_it_says():
             known = [x.real for x in roots if abs(x.imag) < 1e-9 and (x.real - fold) * (a - fold) > 0]
             far.append((a - min([*known, fold], key=lambda x, a=a: abs(a - x))) / u)  # where it has no value, the fold
     print(np.round(far, 1))
-    assert len(far) >= 12 and np.sqrt(np.mean(np.square(far))) < 1.5 and np.max(np.abs(far)) < 4
+    assert len(far) >= 3 * len(seeds) and np.sqrt(np.mean(np.square(far))) < 1.5 and np.max(np.abs(far)) < 4

@@ -171,7 +171,7 @@ def test_systems_that_were_defined_alike_have_their_own_answers() -> None:
         run = ns.simulate(system.with_parameters(**values), duration=length, start=start, samples=2)
         return run["u"].values[-1]
 
-    for start, length in (([0.11, -0.46], 3.4), ([-0.39, 0.63], 11.2), ([0.29, -0.93], 9.6)):
+    for start, length in (([0.11, -0.46], 3.4), ([-0.39, 0.63], 11.2)):
         system = rubbing_between_walls()
         found = ns.sensitivity(system, duration=length, start=start, parameters=["k", "w"])
         assert found.sizes["crossing"] >= 3

@@ -146,7 +146,7 @@ def rubs():
 def test_an_orbit_and_its_branch_go_on_from_a_file(tmp_path):
     """Modes and transitions are numbered as they are met: another process reads them by what they are."""
     orbit = ns.find_orbit(rubs())
-    branch = ns.continue_orbit(orbit, "omega", (0.899, 0.915))
+    branch = ns.continue_orbit(orbit, "omega", (0.899, 0.906))
     assert "special" in branch.sizes
     ns.save(orbit.to_dataset(), tmp_path / "orbit.nc")
     ns.save(branch, tmp_path / "branch.nc")
@@ -155,8 +155,8 @@ def test_an_orbit_and_its_branch_go_on_from_a_file(tmp_path):
     assert names[0] == names[1]
     assert len(set(names[0])) > 2
     np.testing.assert_array_equal(again.floquet_multipliers, orbit.floquet_multipliers)
-    longer = ns.continue_orbit(ns.load(tmp_path / "branch.nc"), range=(0.899, 0.936))
-    shorter = ns.continue_orbit(orbit, "omega", (0.899, 0.936))
+    longer = ns.continue_orbit(ns.load(tmp_path / "branch.nc"), range=(0.899, 0.912))
+    shorter = ns.continue_orbit(orbit, "omega", (0.899, 0.912))
     assert list(longer.special_kind.values) == list(shorter.special_kind.values)
     np.testing.assert_allclose(longer.special_value, shorter.special_value, rtol=1e-8)
 
@@ -224,7 +224,7 @@ def test_numbers_made_at_another_frequency_serve_only_where_they_do_not_depend_o
     wall = E.Stop(at="q1", position=lambda t, u, p: p.pos + moves * np.cos(p.omega * t), restitution="e")
     make = row(4, many_elements() | {"s1": wall}, {"pos", "e", "fr", "kc"})
     one = make()
-    for omega in (0.9, 1.1, 0.95):
+    for omega in (0.9, 1.1):
         both = [
             ns.sensitivity(system, duration=25.0, start={**START, "q4": 0.1, "v_q4": 0.1}, parameters=["omega", "pos"])
             for system in (one.with_parameters(omega=omega), make(omega=omega))

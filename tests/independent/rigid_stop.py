@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 NODES = 48
-HALVINGS = 60
+HALVINGS = 50
 ACCUMULATED = 100  # impacts between two nodes that count as infinitely many
 
 
@@ -37,13 +37,21 @@ class RigidStop:
 
     def flow(self, t: Array, x: Array, v: Array, s: Array) -> tuple[Array, Array]:
         """State a time s after (t, x, v), the stop ignored."""
+        return self.leg(t, x, v)(s)
+
+    def leg(self, t: Array, x: Array, v: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """The flow from (t, x, v) as a function of the time since."""
         x0, v0 = self.forced(t)
-        x1, v1 = self.forced(t + s)
         a = x - x0
         b = (v - v0 + self.decay * a) / self.turn
-        e, cos, sin = np.exp(-self.decay * s), np.cos(self.turn * s), np.sin(self.turn * s)
-        own = e * (a * cos + b * sin)
-        return x1 + own, v1 - self.decay * own + self.turn * e * (b * cos - a * sin)
+
+        def after(s: Array) -> tuple[Array, Array]:
+            x1, v1 = self.forced(t + s)
+            e, cos, sin = np.exp(-self.decay * s), np.cos(self.turn * s), np.sin(self.turn * s)
+            own = e * (a * cos + b * sin)
+            return x1 + own, v1 - self.decay * own + self.turn * e * (b * cos - a * sin)
+
+        return after
 
     def step(self, t: Array, x: Array, v: Array, stuck: NDArray[np.bool_], until: float) -> None:
         """All runs on to one time, in place."""
@@ -87,9 +95,8 @@ class RigidStop:
         top = last.copy()
         peak = (v0 > 0) & (v1 < 0)
         if peak.any():
-            top[peak] = _bisect(
-                lambda s: self.flow(begin[peak], x0[peak], v0[peak], s)[1], np.zeros(peak.sum()), last[peak]
-            )
+            rising = self.leg(begin[peak], x0[peak], v0[peak])
+            top[peak] = _bisect(lambda s: rising(s)[1], np.zeros(peak.sum()), last[peak])
         highest = self.flow(begin, x0, v0, top)[0]
         hit = (highest > d) & ((v0 > 0) | (x1 > d))
         free = ~hit
@@ -97,8 +104,9 @@ class RigidStop:
         if not hit.any():
             return
         b, x0, v0 = begin[hit], x0[hit], v0[hit]
-        s = _bisect(lambda s: d - self.flow(b, x0, v0, s)[0], np.zeros(len(b)), top[hit])
-        speed = self.flow(b, x0, v0, s)[1]
+        towards = self.leg(b, x0, v0)
+        s = _bisect(lambda s: d - towards(s)[0], np.zeros(len(b)), top[hit])
+        speed = towards(s)[1]
         j = i[hit]
         t[j], x[j], v[j] = b + s, d, -e * speed
         pressed = self.p["A"] * np.cos(self.p["omega"] * t[j]) > self.p["k"] * d

@@ -22,7 +22,7 @@ import nonsmooth as ns
 
 pytestmark = pytest.mark.physics
 
-SOME = (0, 3, 6, 13, 14, 17, 66, 81, 83, 96, 223)  # impacts that accumulate, a slip that turns, a stick that ends
+SOME = (0, 6, 14, 66, 83, 223)  # impacts that accumulate, a slip that turns, a stick that ends
 STRUCK = (365,)  # an impact that gives a mass the belt's speed, which damping then opposes
 SLOW = [pytest.param(range(first, first + 100), marks=pytest.mark.slow) for first in range(0, 1000, 100)]
 
@@ -92,7 +92,7 @@ def test_systems_side_by_side_move_as_alone(pairs: list[tuple[int, int]]) -> Non
         assert np.abs(computed(times, *systems) - states).max() < 1e-7, seeds
 
 
-FLOORS = (2, 5, 14, 15, 17, 21, 29, 33, 38, 49, 57, 59)  # frictions and stops that hold the same coordinate
+FLOORS = (5, 14, 15, 17, 21, 29, 38, 49)  # frictions and stops that hold the same coordinate
 LEFT = (298,)  # a force touches its bound where a speed is zero: instant and kernel differ in what is rounding
 
 

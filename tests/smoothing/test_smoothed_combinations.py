@@ -72,7 +72,7 @@ def apart(seed: int, shape: str) -> float:
     return float(np.abs(run.u.values[-1] - expected).max())
 
 
-@pytest.mark.parametrize(("seed", "shape"), [(0, "linear"), (3, "linear"), (5, "tanh"), (10, "arctan"), (13, "arctan")])
+@pytest.mark.parametrize(("seed", "shape"), [(3, "linear"), (5, "tanh"), (10, "arctan")])
 def test_random_combinations(seed: int, shape: str) -> None:
     assert apart(seed, shape) < 1e-8
 
