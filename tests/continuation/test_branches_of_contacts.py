@@ -197,7 +197,13 @@ def test_a_soft_stop_flush_with_a_wall_is_never_pressed(masses: int, at: float) 
 
 
 @pytest.mark.physics
-@pytest.mark.parametrize("rest", ["gap < 0 and closing < 0 and slow > 0", "closing < 0 and slow > 0 and gap < 0"])
+@pytest.mark.parametrize(
+    "rest",
+    [
+        pytest.param("gap < 0 and closing < 0 and slow > 0", marks=pytest.mark.slow),
+        "closing < 0 and slow > 0 and gap < 0",
+    ],
+)
 def test_how_many_impacts_come_before_rest_is_no_special_point_in_any_order_of_conditions(rest: str) -> None:
     """Of a mass that bounces to rest on a wall, written as modes: below a speed of 1e-7 an impact is completed as rest,
     and their number changes along the branch; the motion does not."""

@@ -50,8 +50,8 @@ def henon(a: float, b: float) -> tuple[ns.System, Any]:
 def test_henon_map_1_1_and_1_2(kind: str, a: float, end: float) -> None:
     """Flips at a = 3 (1 - b)^2 / 4, folds at -(1 - b)^2 / 4; 1:2 at (3, -1), 1:1 at (-1, -1); fold-flip at b = 1."""
     system, orbit = henon(a, 0.3)
-    branch = ns.continue_orbit(orbit, "a", (-1.0, 2.0))
-    curve = ns.continue_curve(row(branch, kind), {"a": (-1.9, 3.5), "b": (-1.1, 0.5)})
+    branch = ns.continue_orbit(orbit, "a", (-0.3, 0.5), step=0.1, points=40)
+    curve = ns.continue_curve(row(branch, kind), {"a": (-1.9, 3.5), "b": (-1.1, 0.5)}, step=0.1)
     sign = 3.0 if kind == "flip" else -1.0
     assert curve["a"].values == pytest.approx(sign * (1 - curve["b"].values) ** 2 / 4, abs=1e-10)
     assert [(name, pytest.approx((x, y), abs=1e-8)) for name, x, y in points(curve)] == [

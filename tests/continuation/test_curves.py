@@ -104,7 +104,7 @@ def test_grazing_curve_while_its_touch_and_a_crossing_pass_the_section(damping: 
         },
     )
     branch = ns.continue_orbit(ns.find_orbit(system), "A", (0.1, 0.68))
-    curve = ns.continue_curve(row(branch, "grazing"), {"w": (0.55, 1.15), "A": (0.1, 2.0)}, points=400)
+    curve = ns.continue_curve(row(branch, "grazing"), {"w": (0.55, 1.15), "A": (0.1, 2.0)}, step=0.1)
     A, w = curve["A"].values, curve["w"].values
     assert np.abs(A - np.hypot(1 - w**2, 0.2 * w)).max() < 1e-10
     assert list(curve["ended"].values) == [0, 0] and [w.min(), w.max()] == pytest.approx([0.55, 1.15])
@@ -123,7 +123,7 @@ def test_fold_curve_while_an_impact_passes_the_section() -> None:
     )
     branch = ns.continue_orbit(ns.find_orbit(system), "w", (0.6, 2.0))
     fold = row(branch, "fold")
-    curve = ns.continue_curve(fold, {"phase": (0.0, 6.5), "w": (0.6, 2.0)})
+    curve = ns.continue_curve(fold, {"phase": (0.0, 6.5), "w": (0.6, 2.0)}, step=0.1)
     assert curve["w"].values == pytest.approx(float(fold["w"]), abs=1e-9)
     assert sorted(curve["phase"].values[[0, -1]]) == pytest.approx([0.0, 6.5])
 

@@ -29,7 +29,7 @@ def grazing_curve(y: dict[str, float], g: float, ends: tuple[float, float]) -> x
     branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "g", (0.7 * g, 1.1 * g))
     special = ns.special_points(branch)
     graze = special.isel(special=special["kind"].values.tolist().index("grazing"))
-    curve = ns.continue_curve(graze, {"w": ends, "g": (0.2, 6.0)})
+    curve = ns.continue_curve(graze, {"w": ends, "g": (0.2, 6.0)}, step=0.1)
     w = curve["w"].values
     assert curve["g"].values == pytest.approx(1 / np.hypot(1 - w**2, c * w), rel=1e-10)
     return curve

@@ -191,7 +191,7 @@ def test_a_symmetric_motion_grazes_both_walls_all_along_its_curve(friction: floa
         special = ns.special_points(branch)
         return special.isel(special=special["kind"].values.tolist().index("grazing"))
 
-    curve = ns.continue_curve(graze(1.3), {"F": (0.1, 1.0), "w": (0.95, 1.6)})
+    curve = ns.continue_curve(graze(1.3), {"F": (0.1, 1.0), "w": (0.95, 1.6)}, step=0.1)
     F, w = curve["F"].values, curve["w"].values
     assert w.min() == pytest.approx(0.95) and F.max() == pytest.approx(1.0)  # two edges of the box
     if friction:

@@ -68,7 +68,7 @@ def distance(p: np.ndarray, w: np.ndarray, mu: float, stable: bool, far: float) 
     table = np.concatenate([-rise[::-1], rise])
     curve, width = on_manifold(table, w, mu, stable), 2.0 * np.log(far / 1e-6) / 30_000
     worst, spread = 0.0, np.linspace(-1.0, 1.0, 21)
-    for point in p[::6]:  # sheets lie close together: the nearest of every passage is looked at
+    for point in p[::15]:  # sheets lie close together: the nearest of every passage is looked at
         off = np.linalg.norm(curve - point, axis=1)
         passages = np.flatnonzero((off[1:-1] <= off[:-2]) & (off[1:-1] <= off[2:])) + 1
         t, h = table[passages[np.argsort(off[passages])[:12]]], width

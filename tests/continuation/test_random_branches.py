@@ -128,7 +128,7 @@ def test_mass_at_rest_on_a_table_until_impacts_accumulate() -> None:
     system, name, limits, start = templates.rest(np.random.default_rng([7, 4]))
     branch = ns.continue_orbit(ns.find_orbit(system, start=start, progress=False), name, limits)
     assert endings(branch) == ["range", "range"]
-    assert brute_force.misses(system, branch, name, 20) < 1e-9
+    assert brute_force.misses(system, branch, name, 8) < 1e-9
     special = ns.special_points(branch)
     assert set(special["kind"].values) <= {"grazing", "flip", "fold", "corner"}
     assert "table_slow" not in special["touched"].values  # below that speed impacts are completed: a tolerance

@@ -139,7 +139,7 @@ def test_two_frictions_are_followed_by_their_extreme_points() -> None:
         forcing={"q1": lambda t, p: p.P},
         elements={"f": E.Coulomb(at="q1", friction=bounds[0]), "g": E.Coulomb(at="q2", friction=bounds[1])},
     )
-    branch = ns.continue_equilibrium(system, "P", (-1.0, 2.0))
+    branch = ns.continue_equilibrium(system, "P", (-1.0, 2.0), step=0.06)
     whole(branch, -1.0, 2.0)
     inverse = np.linalg.inv(stiffness)
     middle, half = branch["P"].values[:, None] * inverse[0], np.abs(inverse) @ bounds
@@ -159,7 +159,7 @@ def test_another_extreme_point_is_no_boundary() -> None:
         parameters={"c": -1.0},
         elements={"f": E.Coulomb(at="q1", friction=m), "g": E.Coulomb(at="q2", friction=n)},
     )
-    branch = ns.continue_equilibrium(system, "c", (-1.5, 1.5))
+    branch = ns.continue_equilibrium(system, "c", (-1.5, 1.5), step=0.06)
     c = branch["c"].values
     assert c[[0, -1]] == pytest.approx([-1.5, 1.5])
     assert branch["u_upper"].values[:, 0] == pytest.approx((3 * m + np.abs(c) * n) / (6 - c**2), abs=1e-9)
@@ -235,7 +235,7 @@ def test_friction_between_two_walls(impacts: str) -> None:
         impacts=impacts,
         elements={"friction": ns.elements.Coulomb(at="q", friction="mu"), **walls},
     )
-    branch = ns.continue_equilibrium(system, "F", (-1.5, 1.5))
+    branch = ns.continue_equilibrium(system, "F", (-1.5, 1.5), step=0.05)
     for side, sign in (("lower", -1.0), ("upper", 1.0)):
         ends = np.clip(branch.F + sign * 0.2, -1.0, 1.0)
         np.testing.assert_allclose(branch[f"u_{side}"].sel(state="q"), ends, atol=1e-9)
@@ -243,7 +243,7 @@ def test_friction_between_two_walls(impacts: str) -> None:
 
     section, forces = ns.Poincare("friction_speed"), [0.1, 0.9, 1.4]
     box = {"q": (-0.9, 0.9), "v_q": (-1.0, 1.0)}
-    found = ns.basin_fractions(system, "F", forces, box=box, n_starts=20, section=section, progress=False)
+    found = ns.basin_fractions(system, "F", forces, box=box, n_starts=8, section=section, progress=False)
     np.testing.assert_array_equal(found.fraction, 1.0)
     swept = ns.sweep(
         system,
@@ -286,7 +286,7 @@ def test_equal_systems_number_their_modes_themselves() -> None:
         )
         if first:
             ns.simulate(system, duration=20.0, start=first)
-        found.append(ns.continue_equilibrium(system, "F", (-0.6, 0.6)))
+        found.append(ns.continue_equilibrium(system, "F", (-0.6, 0.6), step=0.06))
     for branch in found:
         q = branch.F.values[:, None] + np.array([-0.2, 0.2])
         ends = np.where(q > 0.5, (q + 1.0) / 3.0, q)  # q + 2 (q - 0.5) = F -+ mu

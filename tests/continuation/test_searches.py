@@ -130,8 +130,8 @@ def test_a_search_ends_with_its_budget(system: ns.System, shown: bool, monkeypat
     """A transient of a thousand million rounds; the time spent is shown, where that is wanted."""
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with pytest.raises(ns.SolveError, match=r"in the budget of 0\.5 s .* budget=") as caught:
-        ns.find_orbit(system, start={"x": 0.5}, transient=10**9, budget=0.5, progress=shown)
+    with pytest.raises(ns.SolveError, match=r"in the budget of 0\.2 s .* budget=") as caught:
+        ns.find_orbit(system, start={"x": 0.5}, transient=10**9, budget=0.2, progress=shown)
     assert caught.value.status == "budget"
     assert ("find_orbit, seconds of its budget" in terminal.getvalue()) == shown
 

@@ -18,8 +18,8 @@ from scipy.interpolate import CubicSpline, PPoly
 import nonsmooth as ns
 
 E = ns.elements
-BY_METHOD = (0, 6, 13, 28, 29, 1)  # all but the last disagreed, or ended, before zero was judged by the size of terms
-BY_RESTARTS = (0, 2, 11, 12, 29, 1)  # before jumps of inputs were followed
+BY_METHOD = (0, 6, 13, 1)  # all but the last disagreed, or ended, before zero was judged by the size of terms
+BY_RESTARTS = (0, 2, 11, 12, 1)  # before jumps of inputs were followed
 
 
 def chain(rng: np.random.Generator, plate: Any, belt: Any, swing: float, **options: Any) -> ns.System:
@@ -115,7 +115,7 @@ def test_sampled_courses_and_restarted_runs(seed: int) -> None:
     assert apart_by_restarts(seed) < 1e-9
 
 
-@pytest.mark.parametrize("seed", [3, 169])
+@pytest.mark.parametrize("seed", [3, pytest.param(169, marks=pytest.mark.slow)])
 def test_smooth_courses_and_restarted_runs(seed: int) -> None:
     assert apart_by_restarts(seed, smooth=True) < 1e-9
 

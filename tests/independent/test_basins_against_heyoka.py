@@ -44,7 +44,7 @@ def check(system: ns.System, machine: hb.Support | hb.Duffing, box: tuple[float,
 @pytest.mark.parametrize("name", SUPPORT)
 def test_basins_of_the_oscillator_with_a_stop(name: str) -> None:
     parameters, box, periods = SUPPORT[name]
-    check(ns.models.discontinuous_support(**parameters), hb.Support(parameters), box, 12, periods)
+    check(ns.models.discontinuous_support(**parameters), hb.Support(parameters), box, 9, periods)
 
 
 def test_basins_of_the_duffing_oscillator() -> None:
@@ -63,7 +63,7 @@ def test_10000_starts_of_the_duffing_oscillator() -> None:
     check(duffing(), hb.Duffing(**DUFFING), (1.5, 1.5), 100, [1, 1])
 
 
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 20), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 20), marks=pytest.mark.slow)])
 def test_exactly_these_attractors_from_200_starts_in_20_seeds(seeds: range) -> None:
     """No slow transient among them, none missing."""
     for parameters, (x, v), periods in SUPPORT.values():

@@ -350,7 +350,7 @@ def energy(system: System, q: Array, v: Array) -> float:
 
 def test_energy_never_grows_without_a_source() -> None:
     ran = 0
-    for seed in range(60):
+    for seed in range(25):
         draw = random_contact_system(seed)
         system = without_source(draw)
         if system is None:
@@ -363,7 +363,7 @@ def test_energy_never_grows_without_a_source() -> None:
         gaps = [e.side * (e.position - states[:, :n] @ e.at) for e in system.elements.values() if isinstance(e, Stop)]
         assert min((g.min() for g in gaps), default=0.0) > -1e-11, seed
         ran += len(states) == 121
-    assert ran > 50
+    assert ran > 20
 
 
 @pytest.mark.slow
