@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import pkgutil
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,7 +14,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.cli.main import main
-from nonsmooth.explorer.catalogue import Catalogue
+from nonsmooth.explorer.catalogue import Catalogue, presets_of
 from nonsmooth.studies import installed, study
 
 ROOT = Path(__file__).parent.parent
@@ -29,10 +30,13 @@ def test_a_study_is_found_by_its_entry_point() -> None:
 
 
 @pytest.fixture
-def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The general toolbox, without any study."""
+def alone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The general toolbox, without any study; what it remembers of that is forgotten."""
     monkeypatch.setattr("nonsmooth.studies.entry_points", lambda group: ())
     vars(ns).pop("identify", None)
+    presets_of.cache_clear()
+    yield
+    presets_of.cache_clear()
 
 
 @pytest.mark.usefixtures("alone")
