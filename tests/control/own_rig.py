@@ -18,7 +18,7 @@ class OwnRig:
 
     def __init__(self, per_turn=40, delay=0, sign=1.0, fault=None, fault_at=None, noise=1e-4, frequency=1.3, seed=0):
         self.step = 2 * math.pi / frequency / per_turn
-        self.substeps = max(1, math.ceil(40 / per_turn))
+        self.substeps = max(1, math.ceil(60 / per_turn))
         self.sign, self.fault, self.fault_at, self.noise = sign, fault, fault_at, noise
         self.rng = np.random.default_rng(seed)
         self.x = self.v = self.phase = self.force = 0.0
