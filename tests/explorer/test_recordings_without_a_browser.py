@@ -27,7 +27,17 @@ def laid(off: float = 0.0, late: float = 0.0, turns: bool = True, **more: Any) -
     asked = {"view": "recording", "text": SYSTEM.to_text(), "values": dict(P), "method": "auto"}
     asked |= {"samples": RecordedStates(t, {"x": x}, marks[(marks >= 0) & (marks <= t[-1])])}
     asked |= {"start": {"x": 0.0, "v": 0.0}, "transient": 300, "period": 1, "periods": 2, "phase": 0.0, "shown": "x"}
-    return compute(asked | more, lambda done: True)
+    return compute(asked | more, lambda done: True)["laid"]
+
+
+def test_what_is_laid_over_a_motion_is_not_taken_for_its_own_section_points() -> None:
+    """Results of all views go by name: the readout failed where the motion's own were not there."""
+    recorded = {"view": "recording", "text": SYSTEM.to_text(), "values": dict(P), "method": "auto"}
+    recorded |= {"samples": RecordedStates(np.arange(9.0), {"x": np.zeros(9)}, np.zeros(0))}
+    recorded |= {"start": {"x": 0.0, "v": 0.0}, "transient": 0, "period": 1, "periods": 1, "phase": 0.0, "shown": "x"}
+    motion = {**recorded, "view": "section", "transient": 10}
+    names = [set(compute(asked, lambda done: True)) for asked in (recorded, motion)]
+    assert names[1] == {"section", "apart"} and not names[0] & names[1]
 
 
 @pytest.mark.parametrize("late", [0.0, 0.3])

@@ -44,6 +44,6 @@ def test_a_record_lies_over_the_period_that_is_its_own_whatever_the_sizes_of_its
     asked = {"view": "recording", "text": system.to_text(), "values": dict(system.values), "method": "auto"}
     asked |= {"samples": samples, "start": {"x": 1e-3, "y": 100.0}, "transient": 0, "period": 2}
     asked |= {"periods": 2, "phase": 0.0, "shown": "x"}
-    found = compute(asked, lambda done: True)["history"]
+    found = compute(asked, lambda done: True)["laid"]["history"]
     assert len(found["x"]) > 300
     assert np.abs(found["x"] - 1e-3 * np.cos(found["time"] / 2)).max() < 1e-6

@@ -269,6 +269,6 @@ _WORK: dict[str, Callable[[Job], Results]] = {
     **dict.fromkeys(_CHARTS, _chart),
     **dict.fromkeys(_BASINS, _basins),
     "spectrum": _spectrum,
-    "recording": laid_over,
+    "recording": lambda job: {"laid": laid_over(job)},
     "fit": fitted,
 }

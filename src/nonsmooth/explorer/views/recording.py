@@ -47,7 +47,7 @@ class RecordingOverlay(View):
 
     def show(self, job: Request, found: Results) -> None:
         """Hand what was found to the bench, and draw the motion anew beside it."""
-        self.sheet.bench.put(found)
+        self.sheet.bench.put(found["laid"])
         self._redraw_all()
 
     def _redraw_all(self) -> None:
