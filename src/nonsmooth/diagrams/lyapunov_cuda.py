@@ -40,7 +40,7 @@ def growth_on_gpu(
     growth : array (P, B, 2)
         Logarithms of the lengths divided out, by batch.
     sums : array (P, 6)
-        Integral of div f, sum of log|det S|, crossings, least angle of a crossing.
+        As :class:`nonsmooth.kernels.hybrid.records.Growth` says.
     status : array (P,)
     """
     parts, size = [], batch_size()

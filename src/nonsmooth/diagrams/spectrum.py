@@ -13,7 +13,6 @@ Fractals 5 (1995) 1671-1681.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +24,7 @@ from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
 from nonsmooth.flow.loads import meter_of
-from nonsmooth.flow.sensitivity import apart, held
+from nonsmooth.flow.sensitivity import order_matters
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.codes import UNBROKEN
@@ -246,22 +245,6 @@ def spectrum_along(
     if growth.beside and order_matters(system, engine, values, state, unit * np.ceil(2 * count / growth.beside)):
         found = replace(found, of_one_order=True)
     return at_rest(found, system, values, begun, state)
-
-
-def order_matters(system: System, engine: Engine, values: FloatArray, state: State, duration: float) -> bool:
-    """Return whether transitions at one instant of the motion from ``state`` on have an order that matters to small
-    changes (:func:`nonsmooth.flow.saltation.of_one_instant`)."""
-    state, flow = state.copy(), VariationalFlow.of(system)
-    state.clock[1] = 0.0
-    t, first = float(state.clock[0]), (int(state.counters[0]), np.concatenate([held(state.u), state.memory]))
-    log = engine.record(engine.prepare(values[None, :]), state, t + duration, np.zeros(0))
-    _, _, times, chains, before = apart(flow, log, first, t, (np.zeros(0), np.zeros(0, dtype=np.int64)))
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        for chain, instant, z in zip(chains, times[1:], before, strict=True):
-            if len(chain) > 1:
-                flow.jump(values, chain, instant, z)
-    return bool(said)
 
 
 def _hold(system: System, frame: Any, values: FloatArray, state: State) -> int:

@@ -138,6 +138,10 @@ def of_one_instant(jumps: list[Jump], scale: FloatArray) -> Jump:
     return reduce(_beside, map(chained, groups))
 
 
+class OneOrderOnly(RuntimeWarning):
+    """Derivatives are those of one order of two transitions at one instant, and the other order's differ."""
+
+
 def _beside(a: Jump, b: Jump) -> Jump:
     one, other = b.saltation @ a.saltation, a.saltation @ b.saltation
     if not np.allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(one).max()):
@@ -145,7 +149,7 @@ def _beside(a: Jump, b: Jump) -> Jump:
             "two transitions happen at one instant, each by itself, and which of them a neighbouring motion meets "
             "first matters: derivatives, and multipliers of an orbit, are those of one order, and do not hold for the "
             "other.",
-            RuntimeWarning,
+            OneOrderOnly,
             stacklevel=2,
         )
     return _joined(a, b, b.S @ a.S)

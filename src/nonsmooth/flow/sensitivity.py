@@ -11,11 +11,12 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.flow.engines.engine import State, TrajectoryLog
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import warn_if_slow
 from nonsmooth.flow.inputs import DelayedInputs, driven
 from nonsmooth.flow.options import Length, as_called
-from nonsmooth.flow.saltation import Jump
+from nonsmooth.flow.saltation import Jump, OneOrderOnly
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state
 from nonsmooth.flow.variational import VariationalFlow
@@ -270,6 +271,24 @@ def variation(
     check_complete(log, system, state, system.period())
     cuts, end = (instants[1:], np.arange(1, len(instants))), np.array([t_end])
     return Variation(flow, values, log, start, 0.0, end, np.zeros((1, flow.n)), course, cuts), log
+
+
+def order_matters(system: System, engine: Engine, values: FloatArray, state: State, duration: float) -> bool:
+    """Return whether transitions at one instant of the motion from ``state`` on have an order that matters to small
+    changes (:func:`nonsmooth.flow.saltation.of_one_instant`)."""
+    state, flow = state.copy(), VariationalFlow.of(system)
+    state.clock[1], t = 0.0, float(state.clock[0])
+    first = int(state.counters[0]), np.concatenate([held(state.u), state.memory])
+    log = engine.record(engine.prepare(values[None, :]), state, t + duration, np.zeros(0))
+    _, _, times, chains, before = apart(flow, log, first, t, (np.zeros(0), np.zeros(0, dtype=np.int64)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", OneOrderOnly)
+        try:
+            for chain, instant, z in zip(chains, times[1:], before, strict=True):
+                flow.jump(values, chain, instant, z)
+        except OneOrderOnly:
+            return True
+    return False
 
 
 @checked
