@@ -128,7 +128,7 @@ class Costs:
             self.seen.add(frame.f_code)
 
     def _keep(self, nodeid: str) -> None:
-        for code in self.seen:
+        for code in self.seen.copy():  # threads that still run add to it
             if code.co_filename.startswith(SOURCES):
                 self.called[f"{code.co_filename.removeprefix(SOURCES)}:{code.co_qualname}"].add(nodeid)
         with open(self.children, "r+", encoding="utf-8") as file:
