@@ -130,6 +130,8 @@ def test_a_knock_is_left_out_and_named() -> None:
     (note,) = [note for note in found.notes if note.startswith("left out")]
     begin, end = (float(word.strip(",")) for word in np.array(note.split())[[4, 6]])
     assert 6.0 < begin < 7.45 and 7.95 <= end < 9.2
+    times = float(note.split("up to ")[1].split()[0])
+    assert 3.0 < times < 150.0  # a hand of 0.3 beside a noise of 2e-3
     within(found, {"k": 9.0, "c": 0.15})
     y = decay(T) + 2e-3 * rng.standard_normal(T.size)
     clean = ns.fit(guess, {"q": (T, y)}, ["k"], leave_out=True, progress=False)
