@@ -149,8 +149,8 @@ def test_a_jump_of_figure_9_and_the_orbits_of_two_quick_clicks_on_its_branches(p
 
 def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any) -> None:
     stage = 'Bokeh.documents[0].get_model_by_name("chart cells").data.stage[0]'
-    page.write("transient", "40")
-    page.write("keep", "16")
+    page.write("transient", "100")
+    page.write("keep", "32")
     page.tab.click("#tab-chart")
     page.until(f'{stage} === "first chart"')
     page.until(f'{stage} === "chart"')
