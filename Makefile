@@ -32,7 +32,7 @@ test: $(VENV)/.compiled-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 slow: $(VENV)/.compiled-test $(VENV)/.installed-cluster  ## run the long campaigns that `make test` leaves out
-	$(BIN)/python -m pytest -m slow -s -o faulthandler_timeout=0
+	$(BIN)/python -m pytest -m slow -rP -o faulthandler_timeout=0 $(PYTEST_ARGS)
 
 installed: $(VENV)/.compiled-test  ## build sdist and wheel; the README's ten lines by the wheel, in an empty environment
 	$(BIN)/python tests/installed.py

@@ -21,8 +21,8 @@ def test_all_components_and_no_other(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(0, 200, 20))
-def test_two_hundred_systems(first: int) -> None:
+@pytest.mark.parametrize("first", [0, 20])
+def test_forty_systems(first: int) -> None:
     faults = {seed: equilibria_campaign.check(seed)[1] for seed in range(first, first + 20)}
     assert {seed: told for seed, told in faults.items() if told} == {}
 
