@@ -190,6 +190,25 @@ def test_a_branch_goes_on_behind_a_boundary_beyond_which_its_equations_have_no_v
     assert found.rows[-1].point.X == pytest.approx([0.4, -0.1], abs=1e-14)
 
 
+def test_a_boundary_that_is_not_found_on_a_long_step_is_looked_for_on_shorter_ones() -> None:
+    """On x = p + 1/2 it is passed on every step that reaches p < 0, and found on those up to 0.003 only."""
+
+    class Shy(Half):
+        def located(self, step: Step) -> tuple[float, Any] | None:
+            return super().located(step) if step.stop < 3e-3 else None
+
+    class Shyly(Along):
+        boundaries = (Shy(),)
+
+    curve = Plane(lambda x, p: (x - p - 0.5, 1.0, -1.0), Plane(lambda x, p: (x - 2 * p - 0.5, 1.0, -2.0)))
+    first = curve.at_parameter(np.array([0.9, 0.4]) / curve.scale, 0.4)
+    assert first is not None
+    found = march(first.facing(-1.0), Limits(((-1, -0.2, 4.0),), 0.05, 500, None), Shyly())
+    assert [one.kind for one in found.special] == ["half"] and found.ending == "range"
+    assert found.special[0].point.X == pytest.approx([0.5, 0.0], abs=1e-9)
+    assert found.rows[-1].point.X == pytest.approx([0.1, -0.2], abs=1e-14)
+
+
 def test_a_zero_at_the_beginning_is_not_met_once_more() -> None:
     """(p - p_a) (p_m - p) vanishes where the step begins and at p_m: the second one is the next."""
     line = Plane(lambda x, p: (x, 1.0, 0.0))
