@@ -403,6 +403,20 @@ def test_arrays_of_hdf5_with_rates_of_their_own(tmp_path: Path) -> None:
         ns.load_recording(path, columns={"x": "trial.x", "f": "trial.force"})
 
 
+def test_an_array_that_is_chosen_by_its_place_or_by_column_has_the_files_unit(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+
+    def fill(file: Any) -> None:
+        for name, values in (("t", np.arange(50.0)), ("table", np.ones((50, 2)))):
+            file[name] = values
+            file[name].attrs["units"] = {"t": "ms", "table": "mm"}[name]
+
+    path.write_bytes(hdf5(fill))
+    recording = ns.load_recording(path, columns={"time": 0, "x": "table(:,2)", "y": ("table(:,1)", "m")})
+    assert recording.units == {"x": "mm", "y": "m"}
+    assert recording.channel("x")["time"].values[-1] == pytest.approx(0.049)
+
+
 def test_pictures_beside_readings_are_left_out_and_told(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
 

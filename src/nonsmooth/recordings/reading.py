@@ -211,12 +211,6 @@ def is_axis_name(name: str, axis: str) -> bool:
     return axis == "time" and (word in TIME_WORDS or (stem in TIME_WORDS and unit in ("s", "ms", "us")))
 
 
-def scaled_time(values: FloatArray, unit: str) -> FloatArray | None:
-    """Times in seconds; None if ``unit`` is no unit of time."""
-    scale = TIME_SCALES.get(unit.partition(" since ")[0].strip())
-    return None if scale is None else values * scale
-
-
 def names_of(candidates: Sequence[str], most: int = 12) -> str:
     """A list for a message, cut where it would be long."""
     shown = ", ".join(repr(name if len(name) <= 60 else name[:57] + "...") for name in candidates[:most])

@@ -165,23 +165,21 @@ def _units(node: Group, names: list[str], reading: Reading, run: str) -> dict[st
 
 def _chosen(variables: Mapping[str, Any], reading: Reading) -> FieldTable:
     """The channels that ``columns`` names by path: ``"data.x"``, ``"runs(2).x"``, ``"M(:,3)"``."""
-    found = [
-        (f"{path}.{name}".lstrip("."), value, node.units.get(name, ""), node.rates.get(name, node.rate))
+    held = {
+        f"{path}.{name}".lstrip("."): (value, node.units.get(name, ""), node.rates.get(name, node.rate))
         for path, node in _containers("", variables, 0)
         for name, value in node.items()
         if _is_array(value)
-    ]
-    arrays = {path: value for path, value, _, _ in found}
-    units = {path: unit for path, _, unit, _ in found}
-    rates = {path: rate for path, *_, rate in found}
+    }
+    arrays = {path: value for path, (value, *_) in held.items()}
     fields, taken = [], dict[float, str]()
     for ours, theirs in (reading.columns or {}).items():
         wanted, unit = theirs if isinstance(theirs, tuple) else (theirs, None)
-        values = _pick(wanted, arrays, reading)
-        path = list(arrays)[wanted] if isinstance(wanted, int) else _PICK.sub(r"\g<path>", wanted)
-        if rate := rates.get(path):
+        path, values = _pick(wanted, arrays, reading)
+        _, own, rate = held[path]
+        if rate:
             taken.setdefault(rate, path)
-        fields.append(Field(ours, units.get(str(wanted), "") if unit is None else unit, values, str(wanted)))
+        fields.append(Field(ours, own if unit is None else unit, values, str(wanted)))
     axis = next((field for field in fields if field.name == reading.axis), None)
     if axis is None and reading.rate is None and len(taken) > 1:
         each = ", ".join(f"{path!r} at {rate:g} Hz" for rate, path in taken.items())
@@ -196,15 +194,15 @@ def _chosen(variables: Mapping[str, Any], reading: Reading) -> FieldTable:
     return FieldTable(_TOP, fields, n, rate=rate)
 
 
-def _pick(wanted: str | int, arrays: Mapping[str, NDArray[Any]], reading: Reading) -> NDArray[Any]:
+def _pick(wanted: str | int, arrays: Mapping[str, NDArray[Any]], reading: Reading) -> tuple[str, NDArray[Any]]:
+    """The path of an array, and the vector that it is or that is chosen of it."""
     path = list(arrays)[wanted] if isinstance(wanted, int) and 0 <= wanted < len(arrays) else str(wanted)
     if path in arrays and _is_vector(arrays[path]):
-        return arrays[path].ravel()
+        return path, arrays[path].ravel()
     match = _PICK.fullmatch(path)
-    if match and match["path"] in arrays and arrays[match["path"]].ndim == 2:
-        table = arrays[match["path"]] if match["column"] else arrays[match["path"]].T
-        k = int(match["k"] or match["j"])
+    if match and (whole := arrays.get(match["path"])) is not None and whole.ndim == 2:
+        table, k = whole if match["column"] else whole.T, int(match["k"] or match["j"])
         if 1 <= k <= table.shape[1]:
-            return table[:, k - 1]
+            return match["path"], table[:, k - 1]
     shown = [f"{name} {value.shape}" for name, value in arrays.items()]
     raise reading.error("", f"no vector {path!r}; there are {names_of(shown)} (columns of a matrix as 'M(:,2)')")

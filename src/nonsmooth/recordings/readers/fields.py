@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.recordings.reading import (
     MAX_COLUMNS,
+    TIME_SCALES,
     Reading,
     Trace,
     is_axis_name,
     names_of,
-    scaled_time,
 )
 
 
@@ -111,11 +111,11 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
     if axis is not None and reading.rate is not None:
         reading.say(f"{axis.origin} is not used as the time, since rate= is given")
         axis = None
-    if axis is None:
-        held, along, unit = np.arange(table.rows), np.empty(0), "s"
-    else:
-        held = np.arange(table.rows) if axis.rows is None else axis.rows
-        along, unit = _along(axis, table, reading)
+    known, clock, unit = np.full(table.rows, axis is None), np.empty(table.rows), "s"
+    if axis is not None:
+        held = slice(None) if axis.rows is None else axis.rows
+        known[held] = True
+        clock[held], unit = _along(axis, table, reading)
     runs = _runs(table, numbers, reading)
     if len(runs) * (len(fields) + 1) > MAX_COLUMNS:
         raise reading.error("", f"holds {len(fields) + 1} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
@@ -124,24 +124,16 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
         if one.values.dtype.kind == "c":
             raise reading.error(one.origin, "holds complex numbers; save its parts as two real vectors")
         for run, inside in runs:
-            whole = inside is None and len(rows) == table.rows
             mine = slice(None) if inside is None else inside[rows]
             at, values = rows[mine], np.ascontiguousarray(one.values[mine], np.float64)
-            blank = (len(held) if inside is None else np.count_nonzero(inside[held])) - len(at)
+            blank = np.count_nonzero(known if inside is None else known & inside) - len(at)
             if blank and len(at):
                 reading.of(run, one.name, f"{blank} blank fields dropped")
-            if axis is None:
-                first = 0 if inside is None else np.flatnonzero(inside)[0]
-                taken = (at - first) / (rate or 1.0)
-            elif whole and len(held) == table.rows:
-                taken = along  # the same array for all: told at once to be one clock
-            else:
-                place = np.minimum(np.searchsorted(held, at), max(len(held) - 1, 0))
-                missing = at[held[place] != at] if len(held) else at
-                if len(missing):
-                    complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {reading.axis}"
-                    raise reading.error(row_of(missing[0], table.lines), complaint)
-                taken = along[place]
+            if not known[at].all():
+                complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {reading.axis}"
+                raise reading.error(row_of(at[~known[at]][0], table.lines), complaint)
+            first = 0 if inside is None else np.flatnonzero(inside)[0]
+            taken = (at - first) / (rate or 1.0) if axis is None else clock if len(at) == table.rows else clock[at]
             lines = None if table.lines is None else table.lines[at]
             yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
 
@@ -171,20 +163,18 @@ def _along(axis: Field, table: FieldTable, reading: Reading) -> tuple[FloatArray
         seconds, begun = seconds_of(axis, table.lines, reading)
         if begun:
             reading.run_attrs.setdefault(table.run, {})["started"] = begun
-        period = (reading.wraps or {}).get("time")
-        return (seconds if period is None else np.unwrap(seconds, period=period)), "s"
-    values = np.asarray(axis.values, float)
-    scaled = scaled_time(values, axis.unit)
-    if scaled is None:
+        return _unwrapped(replace(axis, values=seconds), reading).values, "s"
+    values, scale = np.asarray(axis.values, float), TIME_SCALES.get(axis.unit.partition(" since ")[0].strip())
+    if scale is None:
         raise reading.error(
             "", f"the time column is in {axis.unit!r}, which is no unit of time; say its unit, units={{'time': 'ms'}}"
         )
     if not axis.unit:
         reading.say("the time column has no unit; taken as seconds (else units={'time': 'ms'})")
-    if len(scaled) and scaled[0] > EPOCH:
-        reading.say(f"times count from an epoch, {scaled[0]:.15g} s ago at the first; they begin at 0 here")
-        scaled = np.asarray(scaled_time(values - values[0], axis.unit))
-    return scaled, "s"
+    if len(values) and (begun := values[0] * scale) > EPOCH:
+        reading.say(f"times count from an epoch, {begun:.15g} s ago at the first; they begin at 0 here")
+        values = values - values[0]
+    return values * scale, "s"
 
 
 def _runs(table: FieldTable, numbers: Field | None, reading: Reading) -> list[tuple[str, BoolArray | None]]:
