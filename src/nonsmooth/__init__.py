@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.compare.compare import compare as compare
     from nonsmooth.identification.fit.fit import fit as fit
     from nonsmooth.identification.fit.plan import plan_experiment as plan_experiment
-    from nonsmooth.identification.fit.select import select_model as select_model
+    from nonsmooth.identification.fit.plan import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.identification.propagate import propagate as propagate
@@ -118,7 +118,7 @@ _WHERE = {
     "Recording": "recordings.recording",
     "fit": "identification.fit.fit",
     "Sensor": "identification.fit.sensors",
-    "select_model": "identification.fit.select",
+    "select_model": "identification.fit.plan",
     "plan_experiment": "identification.fit.plan",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.identification.arrow import Residuals
-from nonsmooth.identification.fit import beside
+from nonsmooth.identification.fit import likelihood
 from nonsmooth.identification.fit.first_level import foreseen
 
 
@@ -24,13 +24,13 @@ def test_places_between_are_looked_at_where_the_farthest_is_of_another_piece(
     def cost(theta: np.ndarray, starts: list[None], weights: None) -> float:
         return float(theta[0] ** 2 * (theta[0] != 5.0))
 
-    monkeypatch.setattr(beside, "reduced", lambda *_: (np.eye(1),))
+    monkeypatch.setattr(likelihood, "reduced", lambda *_: (np.eye(1),))
     unknowns = SimpleNamespace(low=np.array([-20.0]), high=np.array([9.0]), precision=np.zeros((1, 1)))
     problem = SimpleNamespace(
         unknowns=unknowns, pieces=[None], steady=(), motion=motion, cost=cost, residuals=lambda *_: None
     )
     problem.weights = lambda state: state
-    found = beside._beside(SimpleNamespace(problem=problem, theta=np.zeros(1), starts=[None]))
+    found = likelihood._beside(SimpleNamespace(problem=problem, theta=np.zeros(1), starts=[None]))
     assert [place.tolist() for _, _, place in found] == [[5.0]] * another_piece
 
 

@@ -49,18 +49,18 @@ class Residuals:
         return sum(each, float(self.alone @ self.alone))
 
 
-class Unsettled(SolveError):
-    """A fit that did not settle; ``distance``: how far its minimum seems, in standard uncertainties.
+class Minimized(NamedTuple):
+    """Parameters, starts and the state where an iteration ended.
 
-    Of the parameters first, then of each piece's start. ``step``: what is left of the way, in the parameters;
-    ``values`` and ``starts``: where it stood.
+    ``short``: how far the minimum seems where no step leads on, in standard uncertainties; 0 at a minimum. ``left``:
+    what is left of the way, in the parameters.
     """
 
-    def __init__(
-        self, message: str, distance: FloatArray, step: FloatArray, values: FloatArray, starts: FloatArray
-    ) -> None:
-        super().__init__(message)
-        self.distance, self.step, self.values, self.starts = distance, step, values, starts
+    theta: FloatArray
+    starts: FloatArray
+    state: Residuals
+    short: float
+    left: FloatArray
 
 
 class Eliminated(NamedTuple):
@@ -131,9 +131,8 @@ def settle(
     used: Any = None,
     known: FloatArray | None = None,
     rough: bool = False,
-) -> tuple[FloatArray, FloatArray, Residuals]:
-    """Levenberg and Marquardt's iteration: parameters, starts, and the state there; `Unsettled` where it does not
-    settle.
+) -> Minimized:
+    """Levenberg and Marquardt's iteration; SolveError for derivatives without bound.
 
     With ``rough`` it ends where it makes little way, or has taken all its iterations: a start for another fit.
     ``known`` is a precision in place of that of the priors. Directions of the parameters that `inverted` says are not
@@ -146,10 +145,6 @@ def settle(
 
     def cost(now: Residuals, at: FloatArray) -> float:
         return now.chi2(weights, used) + float((at - u.centre) @ prior @ (at - u.centre))
-
-    def unsettled(why: str) -> Unsettled:
-        said = f"the fit over {len(problem.pieces)} pieces did not settle{why}"
-        return Unsettled(said, distance, rest, theta, starts)
 
     def step_of(damping: float = 0.0) -> tuple[FloatArray, FloatArray, list[Eliminated]]:
         """A step of the parameters, those at a bound against which the data push them being held; their covariance, and
@@ -166,18 +161,17 @@ def settle(
         covariance[places] = inverted(full[places], damping)[0]
         return covariance @ pull, covariance, back
 
-    def undamped() -> tuple[FloatArray, FloatArray]:
-        """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the
-        parameters'."""
+    def undamped() -> tuple[float, FloatArray]:
+        """The largest undamped step in standard uncertainties, of the parameters or of a start; the parameters'."""
         step, covariance, back = step_of()
         far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
         for i, (piece, start) in enumerate(zip(problem.pieces, back, strict=True)):
             error = np.linalg.norm(start.inverse, axis=1)
             own = np.abs(start.step(step[piece.which])) / np.maximum(error, 1e-150)
             far.append(float(np.max(own)) if used is None or used[i] else 0.0)
-        return np.array(far), step
+        return max(far), step
 
-    best = cost(state, theta)
+    best, none = cost(state, theta), np.zeros(len(theta))
     for _ in range(iterations):
         while True:
             step, _, back = step_of(damping)
@@ -191,24 +185,20 @@ def settle(
             damping *= 8
             # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
             if damping > (1e4 if rough else 1e8):
-                distance, rest = undamped()
-                if (far := np.max(distance)) < _ACCURACY or rough:
-                    return theta, starts, state
-                raise unsettled(
-                    f": no step lowers the sum of squares, though its minimum should be {far:.2g} standard "
-                    "uncertainties away; look at the records for jumps"
-                )
+                far, rest = undamped()
+                near = far < _ACCURACY or rough
+                return Minimized(theta, starts, state, *((0.0, none) if near else (far, rest)))
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.residuals(theta, starts, True)
         # by the undamped step: a damped one is short wherever it is taken
-        distance, rest = undamped()
-        far = np.max(distance)
+        far, rest = undamped()
         if far < _SETTLED or (far < _ACCURACY and gain < 1e-7 * best) or (rough and gain < _LITTLE * best):
-            return theta, starts, state
+            break
         damping = max(damping / 10, 1e-9)
-    if rough:
-        return theta, starts, state
-    raise unsettled(f" in {iterations} iterations")
+    else:
+        if not rough:
+            return Minimized(theta, starts, state, far, rest)
+    return Minimized(theta, starts, state, 0.0, none)
 
 
 class Sandwich(NamedTuple):

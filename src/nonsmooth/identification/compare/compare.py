@@ -14,6 +14,8 @@ from nonsmooth.errors import check_keys
 from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
+from nonsmooth.identification.compare.motion import compare_motion
+from nonsmooth.identification.compare.response import compare_diagram, compare_response
 from nonsmooth.identification.fit.steady import is_steady, of_table
 from nonsmooth.identification.measured_units import compare_units_of_readings, units_of
 from nonsmooth.identification.options import Comparing
@@ -175,17 +177,11 @@ def compare(
         if model.system is not None:
             check_parameter(name, model.theory)
     if kind == "response":
-        from nonsmooth.identification.compare.response import compare_response
-
         variables = compare_response(measured, model, name=name)
     elif kind == "diagram":
-        from nonsmooth.identification.compare.diagram import compare_diagram
-
         phase = real_number(section_phase, "section_phase")
         variables = compare_diagram(measured, model, name=name, direction=direction, values=values, phase=phase)
     else:
-        from nonsmooth.identification.compare.motion import compare_motion
-
         phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(section_phase)]
         if "u" not in measured and len(phases) > 1:
             raise ValueError("measured section points are of one phase: give section_phase as one number")

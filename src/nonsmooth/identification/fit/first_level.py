@@ -73,7 +73,7 @@ def level(stage: Stage, used: Any = None) -> Stage:
     problem = stage.problem
     if not np.isfinite(np.concatenate([*stage.state.residuals, stage.state.alone])).all():
         raise SolveError("a motion over longer windows, or to a steady state, does not come to its end")
-    return Stage(problem, *settle(problem, stage.theta, stage.starts, used, _known(problem), rough=True))
+    return Stage(problem, *settle(problem, stage.theta, stage.starts, used, _known(problem), rough=True)[:3])
 
 
 def foreseen(problem: Windows, theta: FloatArray, starts: FloatArray) -> float:

@@ -14,16 +14,15 @@ from nonsmooth.blas import one_blas_thread
 from nonsmooth.errors import SolveError, check_keys
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.fit.beginnings import beginnings, drawn
-from nonsmooth.identification.fit.beside import looked_beside
 from nonsmooth.identification.fit.first_level import Stage, level, read_modes, without_disagreeing
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, states_from_samples
 from nonsmooth.identification.fit.growth import Grown, finished, grow, with_steady
-from nonsmooth.identification.fit.likelihood import posterior_of
+from nonsmooth.identification.fit.likelihood import looked_beside, posterior_of
 from nonsmooth.identification.fit.motion import Marcher
 from nonsmooth.identification.fit.outcome import outcome
 from nonsmooth.identification.fit.records import irregularity, read_records
+from nonsmooth.identification.fit.sensors import read_unknowns
 from nonsmooth.identification.fit.steady import ROUGHLY
-from nonsmooth.identification.fit.unknowns import read_unknowns
 from nonsmooth.identification.fit.windows import Windows
 from nonsmooth.identification.options import Fitting
 from nonsmooth.identification.parameter_set import ParameterSet

@@ -15,7 +15,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import Residuals, Unsettled, inverted, reduced, settle
+from nonsmooth.identification.arrow import Residuals, inverted, reduced, settle
 from nonsmooth.identification.fit.first_level import (
     BETTER,
     Stage,
@@ -302,7 +302,6 @@ def _freedom(problem: Windows) -> tuple[float, int]:
 def _final(stage: Stage, irregular: FloatArray, rounds: int) -> Grown:
     """The fit at its minimum, with the noise of each quantity from its residuals."""
     problem, theta, starts = stage.problem, stage.theta, stage.starts
-    short, left = 0.0, np.zeros(len(theta))
     for _ in range(rounds):
         colour = colours(problem, problem.plain.residuals(theta, starts))
         problem, before = replace(problem, colour=colour), problem
@@ -314,12 +313,7 @@ def _final(stage: Stage, irregular: FloatArray, rounds: int) -> Grown:
         moves = [np.concatenate([noise / before.noise, *ratios]) - 1.0, colour - before.colour]
         changed = np.max(np.abs(np.concatenate(moves)), initial=0.0)
         problem = replace(problem, noise=noise, steady=steady)
-        try:
-            theta, starts, _ = settle(problem, theta, starts)
-            short, left = 0.0, np.zeros(len(theta))
-        except Unsettled as reason:  # a sum of squares with corners: grazes, rest
-            theta, starts = reason.values, reason.starts
-            short, left = np.max(reason.distance), reason.step
+        theta, starts, _, short, left = settle(problem, theta, starts)
         if changed < 0.02:
             break
     state = problem.residuals(theta, starts)

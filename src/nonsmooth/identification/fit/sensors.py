@@ -1,4 +1,5 @@
-"""``Sensor``: from a state or an output of a system to the numbers of a channel, and its derivatives."""
+"""``Sensor``: from a state or an output of a system to the numbers of a channel, and its derivatives; what a fit may
+find of sensors, of the system and of the clock, shared or of each run."""
 
 from __future__ import annotations
 
@@ -7,11 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import shortened, unknown
+from nonsmooth.errors import check_keys, shortened, unknown
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.kinds import above, at_least, ends, real_number
 from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.system import System
 
@@ -164,3 +166,163 @@ class Observable:
             n_u, states = len(traced.u), z[here]
             out[here] = own(p, t[here], states[:, :n_u], states[:, n_u:]).reshape(len(states), -1)
         return out
+
+
+_CLOCKS = (0.9, 1.1)  # within which the time of the model over that of the recording lies
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """Names, first guesses, bounds and what is known before.
+
+    The parameters of the system that all runs share come first, then those of each run, those of sensors, the clock,
+    and one phase for each run (where it is unknown). On a run act those of `active`, of `sensors`, the clock and the
+    phase, in this order: ``places[run]``.
+
+    Attributes
+    ----------
+    names : tuple of str
+    active : tuple of str
+        The parameters of the system among them, each once.
+    sensors : tuple of (str, str)
+        Quantity and which of gain, offset and delay, for each unknown of a sensor.
+    clock : bool
+        Whether the clock is unknown.
+    phases : int
+        How many phases are unknown: none, or one for each run.
+    units : tuple of str
+    guess, low, high : array (p,)
+    precision : array (p, p)
+        Inverse covariance of what is known before, about ``centre``.
+    places : array (runs, q)
+        Places of the unknowns that act on each run.
+    """
+
+    names: tuple[str, ...]
+    active: tuple[str, ...]
+    sensors: tuple[tuple[str, str], ...]
+    clock: bool
+    phases: int
+    units: tuple[str, ...]
+    guess: FloatArray
+    low: FloatArray
+    high: FloatArray
+    centre: FloatArray
+    precision: FloatArray
+    places: NDArray[np.intp]
+
+    def clock_place(self, run: int) -> int:
+        """The place of the clock of a run; -1 where it is known."""
+        return int(self.places[run][len(self.active) + len(self.sensors)]) if self.clock else -1
+
+
+def read_unknowns(
+    system: System,
+    sensors: Mapping[str, Sensor],
+    parameters: Any,
+    priors: Any,
+    runs: Sequence[str],
+    settings: Sequence[Mapping[str, float]],
+    per_run: Sequence[str] = (),
+    steady: int = 0,
+) -> Unknowns:
+    """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own; the last
+    ``steady`` runs have no phase. A parameter that is set in a run is known there; one that is called ``clock`` or
+    ``phase`` is a parameter as any other.
+    """
+    given = [parameters] if isinstance(parameters, str) else list(parameters)
+    bounds = dict(parameters) if isinstance(parameters, Mapping) else {}
+    known = {"clock": (1.0, ""), "phase": (0.0, "periods")}  # first guess and unit of all that may be found
+    known |= {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
+    for q, unit in {**system.states, **system.outputs}.items():
+        if q in sensors:
+            inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
+            for what, of in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
+                known[f"{q}.{what}"] = (getattr(sensors[q], what), of)
+    allowed = {name: unit for name, (_, unit) in known.items()}
+    if not given:
+        raise ValueError(f"parameters names nothing to be found; allowed: {', '.join(allowed)}")
+    if twice := [name for name in given if given.count(name) > 1]:
+        raise ValueError(f"parameters names {twice[0]!r} twice; name each once")
+    for name in given:
+        if name not in allowed:
+            raise ValueError(unknown(name, "an unknown of this fit", repr(system.name), allowed))
+        if all(name in own for own in settings):
+            raise ValueError(f"{name!r} stands in parameters, to be found, and in settings, as known: leave one out")
+    clock, phase = (name in given and name not in system.values for name in ("clock", "phase"))
+    if phase and (system.period() is None or steady == len(runs)):
+        why = "it has no forcing period" if system.period() is None else "readings of steady states have none"
+        raise ValueError(f"the phase of {system.name!r} cannot be found: {why}; leave 'phase' out")
+    active = tuple(name for name in given if name in system.values)
+    of_sensors = tuple((q, what) for name in given if "." in name for q, what in [name.split(".", 1)])
+    check_keys(per_run, given, "per_run", "an unknown", "this fit")
+    phases = (len(runs) - steady) * phase
+    each = {*per_run, *["phase"] * phase} if len(runs) > 1 else set()
+    local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * phase]
+    rows = [
+        (n, run) for n in local for run in (runs[: phases if phase and n == "phase" else None] if n in each else [""])
+    ]
+    rows.sort(key=lambda row: 2 if row[0] not in active else row[0] in each)
+    base, names = [n for n, _ in rows], [f"{n}, {run}" if n in each else n for n, run in rows]
+    last = [base.count(n) - 1 for n in local]  # of each
+    places = np.array(
+        [[base.index(n) + min(run, most) for n, most in zip(local, last, strict=True)] for run in range(len(runs))],
+        np.intp,
+    )
+    guess = np.array([known[name][0] for name in base])
+    low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    for i, name in enumerate(names):
+        if clock and base[i] == "clock":
+            low[i], high[i] = _CLOCKS
+        if (pair := bounds.get(base[i])) is not None:
+            low[i], high[i] = ends(pair, name)
+            if not low[i] <= guess[i] <= high[i]:
+                raise ValueError(
+                    f"the first guess {name} = {guess[i]:g} lies outside its bounds {low[i]:g} ... {high[i]:g}; set "
+                    f"another with system.with_parameters({name}=...)"
+                )
+    centre, precision = _known(names, priors, guess)
+    return Unknowns(
+        tuple(names),
+        active,
+        of_sensors,
+        clock,
+        phases,
+        tuple(allowed[name] for name in base),
+        guess,
+        low,
+        high,
+        centre,
+        precision,
+        places,
+    )
+
+
+def _known(names: list[str], priors: Any, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Centre and precision of what is known before: ``{name: (value, standard uncertainty)}``, or a ParameterSet."""
+    p = len(names)
+    centre, precision = guess.copy(), np.zeros((p, p))
+    if priors is None:
+        return centre, precision
+    if hasattr(priors, "full_covariance"):
+        covariance = priors.full_covariance
+        held = [name for name in names if name in covariance["parameter"].values]
+        places = [names.index(name) for name in held]
+        part = covariance.sel(parameter=held, other=held).values
+        centre[places] = [priors.estimate(name).value for name in held]
+        precision[np.ix_(places, places)] = np.linalg.inv(part)
+        return centre, precision
+    if not isinstance(priors, Mapping):
+        raise TypeError(
+            f"priors = {shortened(priors)}: allowed are {{name: (value, standard uncertainty)}} and a ParameterSet"
+        )
+    check_keys(priors, names, "priors", "an unknown", "this fit")
+    for name, pair in priors.items():
+        if not isinstance(pair, list | tuple) or len(pair) != 2:
+            raise TypeError(f"priors[{name!r}] = {shortened(pair)}: allowed is (value, standard uncertainty)")
+        value, error = (real_number(number, f"priors[{name!r}]") for number in pair)
+        if not error > 0:
+            raise ValueError(f"priors[{name!r}]: the standard uncertainty {error:g} must be positive")
+        i = names.index(name)
+        centre[i], precision[i, i] = value, error**-2.0
+    return centre, precision

@@ -20,9 +20,8 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.identification.arrow import Residuals
 from nonsmooth.identification.fit.motion import Marcher, SampledMotion
 from nonsmooth.identification.fit.records import Record
-from nonsmooth.identification.fit.sensors import Observable, Sensor
+from nonsmooth.identification.fit.sensors import Observable, Sensor, Unknowns
 from nonsmooth.identification.fit.steady import SteadyReadings, predicted
-from nonsmooth.identification.fit.unknowns import Unknowns
 from nonsmooth.recordings.signals.spectrum import correlation_times
 from nonsmooth.system.system import System
 
