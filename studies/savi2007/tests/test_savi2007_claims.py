@@ -9,8 +9,15 @@ import xarray as xr
 import nonsmooth as ns
 from nonsmooth_savi2007 import grazing_frequencies
 from nonsmooth_savi2007.claims.response import main_jump, small_jump
-from nonsmooth_savi2007.grazing import free_amplitude, steady_state
-from nonsmooth_savi2007.measure import UNSETTLED, Interval, changes, regimes, separation_rate
+from nonsmooth_savi2007.measure import (
+    UNSETTLED,
+    Interval,
+    changes,
+    free_amplitude,
+    regimes,
+    separation_rate,
+    steady_state,
+)
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_17
 
 TABLE_1 = {"m": 0.838, "k": 8.47, "c": 0.87}

@@ -11,8 +11,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth_savi2007 import reproduce
 from nonsmooth_savi2007.claims.diagrams import attractors
-from nonsmooth_savi2007.figures.charts import CHARTS, curves, grid_of
-from nonsmooth_savi2007.figures.coexisting import names_of
+from nonsmooth_savi2007.figures.charts import CHARTS, curves, grid_of, names_of
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.study import figures_of_the_study
 

@@ -16,8 +16,8 @@ from nonsmooth_savi2007.claims.portraits import at_gap
 from nonsmooth_savi2007.claims.response import between_cell, doubled_cell, grazing_cell, no_doubled_cell
 from nonsmooth_savi2007.claims.verdicts import Cell, Statement, Verdict, printed_cell
 from nonsmooth_savi2007.figures.motions import chosen, measured_periods_at, said
-from nonsmooth_savi2007.findings import found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
+from nonsmooth_savi2007.laboratory import found_in, kept, the_finding
 from nonsmooth_savi2007.measure import Interval, jumps, main_jump, measured_periods
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_14, NUMBERS, TABLE_1
 

@@ -16,12 +16,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nonsmooth_savi2007.grazing import grazing_frequencies as grazing_frequencies
+    from nonsmooth_savi2007.measure import grazing_frequencies as grazing_frequencies
     from nonsmooth_savi2007.study import Reproduction as Reproduction
     from nonsmooth_savi2007.study import reproduce as reproduce
 
 #: Loaded when first used: identifying a rig needs nothing of the reproduction.
-_WHERE = {"Reproduction": "study", "grazing_frequencies": "grazing", "reproduce": "study"}
+_WHERE = {"Reproduction": "study", "grazing_frequencies": "measure", "reproduce": "study"}
 
 __all__ = ["Reproduction", "grazing_frequencies", "reproduce"]
 

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import ParameterSet, Recording, __version__, compare
+from nonsmooth.identification import Finding
 from nonsmooth.models import discontinuous_support
 from nonsmooth.recordings import Session, load_session
 from nonsmooth.recordings.signals.displacement import found_resolution
@@ -133,3 +134,24 @@ def as_result(dataset: xr.Dataset, what: str, verb: str = "rig", *, synthetic: b
     """A dataset that was put together here, with the record that ``nonsmooth.load`` asks for."""
     record = {"version": __version__, "verb": verb, "what": what, "synthetic": synthetic}
     return dataset.assign_attrs({"nonsmooth": json.dumps(record)} | ({"synthetic": "yes"} if synthetic else {}))
+
+
+def the_finding(identified: ParameterSet, name: str) -> Finding:
+    """The finding of that name; ValueError where the session did not tell it."""
+    for finding in identified.findings:
+        if finding.name == name:
+            return finding
+    known = ", ".join(finding.name for finding in identified.findings)
+    raise ValueError(f"identification made no finding {name!r}; it made: {known}")
+
+
+def kept(finding: Finding) -> xr.Dataset:
+    """The finding's data for its picture, with the finding itself in the attribute ``finding``."""
+    data = xr.Dataset(attrs={"synthetic": "yes"}) if finding.data is None else finding.data.copy()
+    result = as_result(data, finding.name, "identify", synthetic=data.attrs.get("synthetic") == "yes")
+    return result.assign_attrs(finding=json.dumps(finding.to_record(), ensure_ascii=False, default=float))
+
+
+def found_in(data: xr.Dataset) -> Finding:
+    """Read back what :func:`kept` put into the dataset."""
+    return Finding.from_record(json.loads(data.attrs["finding"]))

@@ -15,10 +15,8 @@ from nonsmooth.plot import journal, save_figure
 from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.claims.claims import Statement, measure_claims
 from nonsmooth_savi2007.figures import (
-    attractor,
     band,
     charts,
-    coexisting,
     diagrams,
     measured_diagrams,
     motions,
@@ -37,8 +35,6 @@ FILES = (
     resonance,
     diagrams,
     portraits,
-    attractor,
-    coexisting,
     charts,
     band,
     parameters,

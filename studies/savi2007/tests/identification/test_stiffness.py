@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from studies.savi2007.tests.identification.made import counted, run
 
-from nonsmooth_savi2007.identification.stiffness import stiffness
+from nonsmooth_savi2007.identification.calibrations import stiffness
 
 S, M, DRY, C = 17.0, 0.84, 0.010, 0.9
 

@@ -21,15 +21,15 @@ from nonsmooth_savi2007.claims.verdicts import (
     of_both,
     printed_cell,
 )
-from nonsmooth_savi2007.figures.attractor import PHASES
-from nonsmooth_savi2007.figures.coexisting import names_of
+from nonsmooth_savi2007.figures.charts import names_of
 from nonsmooth_savi2007.figures.measured_diagrams import flip_of, rate_of, slowest
-from nonsmooth_savi2007.grazing import free_amplitude
+from nonsmooth_savi2007.figures.motions import PHASES
 from nonsmooth_savi2007.measure import (
     APERIODIC,
     UNSETTLED,
     Interval,
     changes,
+    free_amplitude,
     motion_word,
     parameter_of,
     period_word,

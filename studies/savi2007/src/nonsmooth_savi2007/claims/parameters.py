@@ -24,7 +24,7 @@ from nonsmooth_savi2007.claims.verdicts import (
     printed_cell,
 )
 from nonsmooth_savi2007.figures.parameters import table_rows
-from nonsmooth_savi2007.findings import found_in
+from nonsmooth_savi2007.laboratory import found_in
 from nonsmooth_savi2007.measure import Interval
 from nonsmooth_savi2007.printed import NATURAL_FREQUENCY, NUMBERS, TABLE_1, TEST_MASS, Printed
 

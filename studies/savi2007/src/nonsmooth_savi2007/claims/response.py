@@ -24,10 +24,10 @@ from nonsmooth_savi2007.claims.verdicts import (
 )
 from nonsmooth_savi2007.figures.branches import branches_of
 from nonsmooth_savi2007.figures.resonance import grazing_of
-from nonsmooth_savi2007.grazing import grazing_frequencies
 from nonsmooth_savi2007.measure import (
     Interval,
     changes,
+    grazing_frequencies,
     main_jump,
     measured_periods,
     range_of,

@@ -14,8 +14,8 @@ from scipy.optimize import bisect
 from nonsmooth import System, plot, poincare, simulate
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import ETA, EXACT, SMOOTHED, Settings
-from nonsmooth_savi2007.grazing import grazing_frequencies, steady_state
 from nonsmooth_savi2007.laboratory import as_result
+from nonsmooth_savi2007.measure import grazing_frequencies, steady_state
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_11, FIGURE_13
 
 ORBITS = {

@@ -14,9 +14,8 @@ from nonsmooth import ParameterSet, plot
 from nonsmooth.identification import Estimate
 from nonsmooth.plot import identification as pictures
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
-from nonsmooth_savi2007.findings import found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
-from nonsmooth_savi2007.laboratory import TRUTH, as_result
+from nonsmooth_savi2007.laboratory import TRUTH, as_result, found_in, kept, the_finding
 from nonsmooth_savi2007.measure import with_uncertainty
 from nonsmooth_savi2007.printed import NUMBERS, TABLE_1
 from nonsmooth_savi2007.rig import IDENTIFICATION, UNITS, load_truth

@@ -18,9 +18,8 @@ from nonsmooth.plot import annotate, comparison_response, shared_legend
 from nonsmooth_savi2007.figures.branches import VARIED, branches, branches_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings
-from nonsmooth_savi2007.grazing import grazing_frequencies
 from nonsmooth_savi2007.laboratory import as_result
-from nonsmooth_savi2007.measure import jumps, measured_periods
+from nonsmooth_savi2007.measure import grazing_frequencies, jumps, measured_periods
 from nonsmooth_savi2007.printed import NUMBERS
 from nonsmooth_savi2007.rig.motor import voltage_for
 

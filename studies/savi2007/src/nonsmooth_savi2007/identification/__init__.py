@@ -4,7 +4,7 @@
 out of a session.
 """
 
-from nonsmooth_savi2007.identification.calibrations import crank_force, voltage_frequency
+from nonsmooth_savi2007.identification.calibrations import crank_force, stiffness, voltage_frequency
 from nonsmooth_savi2007.identification.chain import identify
 from nonsmooth_savi2007.identification.decay_findings import decay_damping, natural_frequency, support_damping
 from nonsmooth_savi2007.identification.evidence import gather
@@ -15,7 +15,6 @@ from nonsmooth_savi2007.identification.referral import mean_of_drive, mean_shift
 from nonsmooth_savi2007.identification.response_fits import amplitude_fit, receptance_fit, viscous_bias
 from nonsmooth_savi2007.identification.statements import require
 from nonsmooth_savi2007.identification.steady import steady
-from nonsmooth_savi2007.identification.stiffness import stiffness
 
 __all__ = [
     "amplitude_fit",

@@ -16,7 +16,7 @@ from nonsmooth import ParameterSet, SolveError
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import RecordingWarning, Session
 from nonsmooth_savi2007.identification.adjustment import Adjusted, Observation, adjust
-from nonsmooth_savi2007.identification.calibrations import crank_force, voltage_frequency
+from nonsmooth_savi2007.identification.calibrations import crank_force, stiffness, voltage_frequency
 from nonsmooth_savi2007.identification.cross_checks import cross_checks, sentences
 from nonsmooth_savi2007.identification.decay_findings import decay_damping, natural_frequency, support_damping
 from nonsmooth_savi2007.identification.evidence import Evidence, gather
@@ -40,7 +40,6 @@ from nonsmooth_savi2007.identification.statements import (
     joined,
 )
 from nonsmooth_savi2007.identification.steady import steady
-from nonsmooth_savi2007.identification.stiffness import stiffness
 
 #: The findings that name the runs of a procedure which were used.
 _FOUND_BY = {

@@ -44,9 +44,8 @@ from nonsmooth import SolveError
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.identification.evidence import Run
+from nonsmooth_savi2007.identification.evidence import Run, picture_data
 from nonsmooth_savi2007.identification.free_decay import Decay, DecayFit, free_decay
-from nonsmooth_savi2007.identification.picture_data import picture_data
 
 _SLOWEST = 0.02  # m/s, of the slowest half swing of the test mass that is used
 GRID = 2048  # samples of the paper's DFT: 100 Hz / 2048 * 15 = 0.732 Hz

@@ -37,9 +37,8 @@ from scipy.optimize import brentq
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
-from nonsmooth_savi2007.identification.evidence import Run
+from nonsmooth_savi2007.identification.evidence import Run, picture_data
 from nonsmooth_savi2007.identification.free_decay import DecayFit
-from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.response_fits import grazing_amplitude
 from nonsmooth_savi2007.identification.steady import Steady, steady
 

@@ -37,9 +37,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.identification.cross_checks import inverse
-from nonsmooth_savi2007.identification.evidence import Run
+from nonsmooth_savi2007.identification.evidence import Run, picture_data
 from nonsmooth_savi2007.identification.free_decay import DecayFit
-from nonsmooth_savi2007.identification.picture_data import picture_data
 
 SHARED = ("omega_0", "b", "f", "kappa", "gamma")
 OWN = ("g", "x_e", "crank", "mark", "cosine_2", "sine_2")  # of each run

@@ -31,8 +31,8 @@ from nonsmooth import SolveError
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
+from nonsmooth_savi2007.identification.evidence import picture_data
 from nonsmooth_savi2007.identification.free_decay import DecayFit
-from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady
 
 #: Frequencies relative to the natural one over which Fig. 6 is fitted, where no others are given.
