@@ -139,21 +139,16 @@ def response(
     return records(rig, "response", [*settings, *after], carry=True)
 
 
-def grazing(
-    rig: VirtualRig,
-    *,
-    crank_length: float = 0.010,
-    gap: float = NOMINAL_GAP,
-    half_width: float = 0.5,
-    step: float = 0.05,
-    duration: float = 15.0,
-) -> Recording:
-    """Frequency steps down through the first contact, ``step`` rad/s apart, the motion carried along."""
-    rng = rig.generator("grazing", 9999)
-    centre = graze_frequency(rig, crank_length, gap) + rng.uniform(-2, 2) * step
+_GRAZING = 0.010, 0.05  # m, length of the crank; rad/s, from step to step
+
+
+def grazing(rig: VirtualRig, *, half_width: float = 0.5, duration: float = 15.0) -> Recording:
+    """Frequency steps down through the first contact, ``half_width`` rad/s to either side, the motion carried along."""
+    length, step = _GRAZING
+    centre = graze_frequency(rig, length, NOMINAL_GAP) + rig.generator("grazing", 9999).uniform(-2, 2) * step
     omegas = np.arange(centre + half_width, centre - half_width, -step)
-    voltages = list(dict.fromkeys(voltage_for(rig, omega) for omega in omegas))
-    settings = [SteadyRun(voltage, crank_length, gap, duration, {"direction": "down"}) for voltage in voltages]
+    voltages = dict.fromkeys(voltage_for(rig, omega) for omega in omegas)
+    settings = [SteadyRun(voltage, length, NOMINAL_GAP, duration, {"direction": "down"}) for voltage in voltages]
     return records(rig, "grazing", settings, carry=True)
 
 
@@ -174,13 +169,7 @@ def graze_frequency(rig: VirtualRig, crank_length: float, gap: float) -> float:
     )
 
 
-def contact(
-    rig: VirtualRig,
-    *,
-    regimes: Sequence[tuple[float, float]] = REGIMES,
-    gap: float = NOMINAL_GAP,
-    duration: float = 20.0,
-) -> Recording:
+def contact(rig: VirtualRig, *, regimes: Sequence[tuple[float, float]] = REGIMES, duration: float = 20.0) -> Recording:
     """Records with contact at (frequency in rad/s, crank length in m), each begun at rest."""
-    settings = [SteadyRun(voltage_for(rig, omega), length, gap, duration) for omega, length in regimes]
+    settings = [SteadyRun(voltage_for(rig, omega), length, NOMINAL_GAP, duration) for omega, length in regimes]
     return records(rig, "contact", settings)

@@ -21,31 +21,32 @@ if TYPE_CHECKING:
 
 
 Run = tuple[str, Mapping[str, Any], Mapping[str, Any]]
+_REACH, _PUSH = 0.12, 35.0  # m, of a pull of the car; N, of a push on the support
 _TREMOR = 1e-4  # m, with the frequencies below in Hz
 _TREMBLING = (1.1, 1.7, 2.6)
 _TURNING = 1.0  # s, that the hand takes to start, to turn, and to stop
 
 
-def springs(rig: VirtualRig, *, reach: float = 0.12, n: int = 6) -> Recording:
-    """Pull the car slowly to ``reach`` (m) and back by the force sensor, to both sides in turn; ``n`` runs: Fig. 4a."""
+def springs(rig: VirtualRig, *, n: int = 6) -> Recording:
+    """Pull the car slowly away and back by the force sensor, to both sides in turn; ``n`` runs: Fig. 4a."""
     p = rig.named_parameters(crank_length=0.0)
     limit = p.pretension / p.k
-    if reach * 1.01 > limit:
-        raise ValueError(f"reach = {reach!r} m would slacken a string; stay below {limit:.3f} m")
+    if _REACH * 1.01 > limit:
+        raise ValueError(f"a pull of {_REACH!r} m would slacken a string; stay below {limit:.3f} m")
     return _by_hand(
         rig,
         "springs",
         (40.0, 60.0),
-        [(-1.0 if i % 2 else 1.0) * reach for i in range(n)],
+        [(-1.0 if i % 2 else 1.0) * _REACH for i in range(n)],
         0.9,
         lambda x, v, acceleration: p.m * acceleration + 2 * p.k * x + friction(v, p),
     )
 
 
-def support(rig: VirtualRig, *, force: float = 35.0, n: int = 6) -> Recording:
-    """Push the support's spring up to about ``force`` (N) and let it come back; ``n`` runs: Fig. 4b."""
+def support(rig: VirtualRig, *, n: int = 6) -> Recording:
+    """Push the support's spring up and let it come back; ``n`` runs: Fig. 4b."""
     k_s, c_s = rig.truth["k_s"], rig.truth["c_s"]
-    return _by_hand(rig, "support", (15.0, 25.0), [force / k_s] * n, 0.85, lambda y, v, _: k_s * y + c_s * v)
+    return _by_hand(rig, "support", (15.0, 25.0), [_PUSH / k_s] * n, 0.85, lambda y, v, _: k_s * y + c_s * v)
 
 
 def _by_hand(

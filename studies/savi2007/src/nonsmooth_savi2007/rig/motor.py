@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 MAX_VOLTAGE = 12.0  # V
+_TURNS, _HELD = 40, 20.0  # turns of the motor alone; s, of a car that is held
 VOLTAGE_STEP = 0.001  # V, of the supply's knob
 
 
@@ -71,14 +72,14 @@ def passages(rig: VirtualRig, omega: float, begin: float, end: float, **wander: 
     return at
 
 
-def voltage(rig: VirtualRig, *, voltages: Sequence[float] = range(2, 13), turns: int = 40) -> Recording:
-    """The motor alone, at one voltage (V) per run, for about ``turns`` passages of the photogate: Fig. 8a."""
+def voltage(rig: VirtualRig, *, voltages: Sequence[float] = range(2, 13)) -> Recording:
+    """The motor alone, at one voltage (V) per run, for some forty passages of the photogate: Fig. 8a."""
     runs = []
     for i, setting in enumerate(voltages):
         rng = rig.generator("voltage", i)
         omega = frequency(rig, setting)
         begin = rng.uniform(0, 2 * np.pi / omega)
-        end = begin + turns * 2 * np.pi / omega
+        end = begin + _TURNS * 2 * np.pi / omega
         crossed = passages(rig, omega, begin, end, **rig.wander("voltage", i, omega)) - begin
         runs.append((f"Run #{i + 1}", {"Turn": sensors.turns(rig, crossed)}, {"voltage": float(setting)}))
     return rig.recording("voltage", runs)
@@ -89,7 +90,6 @@ def crank(
     *,
     lengths: Sequence[float] = (0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06),
     voltage: float = 4.0,
-    duration: float = 20.0,
 ) -> Recording:
     """The car held at x = 0 by the force sensor, at one crank length (m) per run, feels k d(phi): Fig. 8b."""
     runs = []
@@ -97,11 +97,11 @@ def crank(
     for i, length in enumerate(lengths):
         rng, name = rig.generator("crank", i), f"Run #{i + 1}"
         begin = rng.uniform(0, 2 * np.pi / omega)
-        time, at = sensors.instants(rig, rng, duration)
+        time, at = sensors.instants(rig, rng, _HELD)
         wander = rig.wander("crank", i, omega)
         p = rig.named_parameters(omega=omega, crank_length=length, **wander)
         pulled = rig.truth["motor_side"] * p.k * drive(begin + at, p, p.crank_length, rig.wanders)
-        crossed = passages(rig, omega, begin, begin + duration, **wander) - begin
+        crossed = passages(rig, omega, begin, begin + _HELD, **wander) - begin
         channels = {"Force": sensors.force(rig, rng, name, time, pulled), "Turn": sensors.turns(rig, crossed)}
         runs.append((name, channels, {"crank_length": float(length), "voltage": voltage}))
     return rig.recording("crank", runs)
