@@ -51,15 +51,14 @@ class ResponseCurve:
     phase: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        given = {"frequency": self.frequency, "amplitude": self.amplitude, "force": self.force, "phase": self.phase}
-        sizes = {key: np.shape(v) for key, v in given.items() if v is not None}
-        if len(set(sizes.values())) != 1 or len(next(iter(sizes.values()))) != 1:
+        given = {key: np.asarray(v) for key, v in vars(self).items() if key != "name" and v is not None}
+        sizes = {key: v.shape for key, v in given.items()}
+        if {*sizes.values()} != {(given["frequency"].size,)}:
             raise ValueError(f"curve {self.name!r}: all must be arrays of one length, got {sizes}")
         for key, v in given.items():
-            if v is not None and not np.isfinite(v).all():
-                bad = np.count_nonzero(~np.isfinite(v))
+            if bad := np.count_nonzero(~np.isfinite(v)):
                 raise ValueError(f"curve {self.name!r}: {bad} values of {key} are not finite; leave those points out")
-            if v is not None and key != "phase" and not (np.asarray(v) > 0).all():
+            if key != "phase" and not (v > 0).all():
                 raise ValueError(f"curve {self.name!r}: {key} must be positive everywhere; leave other points out")
 
 

@@ -291,18 +291,20 @@ class Finding:
         return cls(**{**record, **read})
 
     def __str__(self) -> str:
-        lines = [f"{self.name} = {self.estimate}", f"  {self.method}", f"  from {self._used()}"]
+        lines = [f"{self.name} = {self.estimate}", f"  {self.method}", f"  from {self.used}"]
         lines += [f"  besides: {name} = {other}" for name, other in self.others.items()]
         return "\n".join(lines + [f"  note: {note}" for note in self.notes])
 
     def __repr__(self) -> str:
         notes = f"; {len(self.notes)} notes: see .notes" if self.notes else ""
-        return f"<Finding {self.name} = {self.estimate}: {cut(self.method, 80)}; from {self._used()}{notes}>"
+        return f"<Finding {self.name} = {self.estimate}: {cut(self.method, 80)}; from {self.used}{notes}>"
 
     def _repr_html_(self) -> str:
-        rows = [("method", self.method), ("from", self._used())]
+        rows = [("method", self.method), ("from", self.used)]
         rows += [(f"besides: {name}", str(other)) for name, other in self.others.items()]
         return html_table(f"{self.name} = {self.estimate}", rows, details=self.notes, of="notes")
 
-    def _used(self) -> str:
+    @property
+    def used(self) -> str:
+        """Number of samples, and of runs, in words."""
         return f"{self.samples_used} samples" + (f" of {len(self.runs)} runs" if self.runs else "")

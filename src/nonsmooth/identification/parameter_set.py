@@ -127,12 +127,12 @@ class ParameterSet(Answering, Mapping[str, float]):
     def covariance(self) -> xr.DataArray:
         """Covariance of the model's parameters, ``parameter`` x ``other``."""
         names = list(self.estimates)
-        return self._labelled(names, self._covariance[: len(names), : len(names)])
+        return self.full_covariance.sel(parameter=names, other=names)
 
     @property
     def full_covariance(self) -> xr.DataArray:
         """Covariance of the parameters and of what is in ``extra``."""
-        return self._labelled([*self._rows], self._covariance)
+        return xr.DataArray(self._covariance, {name: [*self._rows] for name in ("parameter", "other")})
 
     @property
     def residuals(self) -> xr.Dataset:
@@ -143,10 +143,8 @@ class ParameterSet(Answering, Mapping[str, float]):
         ValueError
             If it was not made by a fit in this session: residuals are not kept in files.
         """
-        if (data := self._data_of("fit")) is not None:
-            return data
-        other = ", and those of steady states are in .steady" if self._data_of("steady states") is not None else ""
-        raise ValueError(f"this set holds no residuals: they are those of a fit to records in this session{other}")
+        other = ", and those of steady states are in .steady" if "steady states" in self._data else ""
+        return self._data_of("fit", f"residuals: they are those of a fit to records in this session{other}")
 
     @property
     def steady(self) -> xr.Dataset:
@@ -157,9 +155,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         ValueError
             If no such readings were fitted in this session.
         """
-        if (data := self._data_of("steady states")) is not None:
-            return data
-        raise ValueError("this set holds no readings of steady states: they are those of a fit made in this session")
+        return self._data_of("steady states", "readings of steady states: they are those of a fit made in this session")
 
     @property
     def posterior(self) -> xr.DataArray:
@@ -170,16 +166,19 @@ class ParameterSet(Answering, Mapping[str, float]):
         ValueError
             If there are none: they are asked for, and not kept in files.
         """
-        if (data := self._data_of("posterior")) is not None:
-            return data["value"]
-        raise ValueError("this set holds no posterior: ask for one, ns.fit(..., posterior=2000), in this session")
+        return self._data_of("posterior", "posterior: ask for one, ns.fit(..., posterior=2000), in this session")[
+            "value"
+        ]
 
-    def _data_of(self, name: str) -> xr.Dataset | None:
-        return next((one.data for one in self.findings if one.name == name and one.data is not None), None)
+    @property
+    def _data(self) -> dict[str, xr.Dataset]:
+        """Data of the findings that have some."""
+        return {one.name: one.data for one in self.findings if one.data is not None}
 
-    @staticmethod
-    def _labelled(names: list[str], matrix: FloatArray) -> xr.DataArray:
-        return xr.DataArray(matrix, coords={"parameter": names, "other": names}, dims=("parameter", "other"))
+    def _data_of(self, name: str, lacking: str) -> xr.Dataset:
+        if name not in self._data:
+            raise ValueError(f"this set holds no {lacking}")
+        return self._data[name]
 
     def estimate(self, name: str) -> Estimate:
         """A parameter or an extra quantity with all that is known of it.
@@ -211,7 +210,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         They are rows of the posterior where the set has one.
         """
         names = list(self.estimates)
-        if self._data_of("posterior") is not None:
+        if "posterior" in self._data:
             table = self.posterior.sel(parameter=names).values
             values = table[np.random.default_rng(seed).integers(len(table), size=n)]
         else:

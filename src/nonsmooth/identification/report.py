@@ -25,10 +25,8 @@ def report(found: ParameterSet, title: str = "Identified parameters") -> str:
     lines += ["", *(f"- {note}" for note in found.notes), "", "## Correlations", "", *_correlations(found)]
     lines += ["", "## Findings"]
     for finding in found.findings:
-        runs = f" of {len(finding.runs)} runs" if finding.runs else ""
-        lines += ["", f"### {finding.name} = {finding.estimate}", ""]
-        lines.append(f"{finding.method}; from {finding.samples_used} samples{runs}.")
-        lines += ["", *(f"- {name} = {other}" for name, other in finding.others.items())]
+        lines += ["", f"### {finding.name} = {finding.estimate}", "", f"{finding.method}; from {finding.used}.", ""]
+        lines += [f"- {name} = {other}" for name, other in finding.others.items()]
         lines += [f"- {note}" for note in finding.notes]
     return "\n".join(lines) + "\n"
 

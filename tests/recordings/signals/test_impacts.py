@@ -101,7 +101,7 @@ def test_no_impact_is_found_where_there_is_none(motion: object) -> None:
 
 
 def test_what_is_refused() -> None:
-    with pytest.raises(ValueError, match="window must be at least 4 samples"):
+    with pytest.raises(ValueError, match="window = .*at least 4"):
         impacts(np.arange(40.0), np.arange(40.0), window=2)
     with pytest.raises(ValueError, match="too short: 20 usable samples, and finding contacts needs 32"):
         contacts(np.arange(20.0), np.arange(20.0), resolution=1.0)

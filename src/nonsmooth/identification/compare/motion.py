@@ -56,7 +56,12 @@ def compare_motion(
     variables = _clouds(sections, blurred, predicted.sections, scale, model)
     variables |= _periods(number, predicted, returns[0], scale, model.states)
     if motions is not None and sorted(model.places) == list(range(len(motions.system.states))):
-        predicted = _begun_with_the_measurement(motions, folded, number, predicted)
+        # where neither has a period the motion begins at the first measured state that is shown
+        whole = None if folded is None or number or predicted.period_number else _shown(folded)
+        if whole is not None and len(whole):
+            at = np.empty(len(motions.places))
+            at[motions.places] = whole[0, 0]
+            predicted = predicted._replace(orbit=motions.orbit(0, at, len(whole)))
     variables |= _orbits(folded, number, predicted, model)
     if model.system is not None and model.draws:
         assert predicted.attractor is not None  # a System's prediction has one
@@ -173,20 +178,6 @@ def _doubled(single: FloatArray, doubled: FloatArray, scale: FloatArray, number:
     middle, apart = 0.5 * (split[:number] + split[number:]), split[:number] - split[number:]
     away = np.min(np.linalg.norm((middle[:, None] - points) / scale, axis=2), axis=1)
     return np.abs(apart).max(axis=0) if np.linalg.norm(away) < np.linalg.norm(apart / scale) else None
-
-
-def _begun_with_the_measurement(
-    motions: Motions, folded: FloatArray | None, number: int, predicted: Prediction
-) -> Prediction:
-    """Begin the predicted motion at the first measured state that is shown, where neither has a period."""
-    if folded is None or number or predicted.period_number:
-        return predicted
-    whole = _shown(folded)
-    if not len(whole):
-        return predicted
-    at = np.empty(len(motions.places))
-    at[motions.places] = whole[0, 0]
-    return predicted._replace(orbit=motions.orbit(0, at, len(whole)))
 
 
 def _shown(folded: FloatArray) -> FloatArray:

@@ -86,7 +86,17 @@ class Marcher:
         plain = self.once(key, size, lambda: self._marched(values, begin, times, z, mode, drive))
         if plain is None or not derivatives:
             return plain
-        return self.once((*key, True), size, lambda: self._derived(plain, values, begin, mode))
+
+        def derived() -> SampledMotion | None:
+            """None where derivatives are not known: of a start at which several contacts are hit."""
+            start, places = (mode, plain.start), (plain.time, plain.z)
+            try:
+                run = Variation(self.flow, values, plain.log, start, begin, *places, plain.course, plain.changes)
+            except ValueError:
+                return None
+            return replace(plain, rate=run.rate, D=run.D, of_time=run.of_time)
+
+        return self.once((*key, True), size, derived)
 
     def once(self, key: Any, size: int, compute: Callable[[], Any]) -> Any:
         """Return what is computed under a key; the last are kept, as many as there is room for of this size."""
@@ -124,12 +134,3 @@ class Marcher:
         cuts = np.zeros(0) if changes is None else changes.times
         where = cuts, 1 + np.searchsorted(instants, cuts)
         return SampledMotion(times, u[at], log.sample_mode[at], log.sample_segment[at], log, z.copy(), course, where)
-
-    def _derived(self, plain: SampledMotion, values: FloatArray, begin: float, mode: int) -> SampledMotion | None:
-        """The same with derivatives; None where they are not known: of a start at which several contacts are hit."""
-        start, places = (mode, plain.start), (plain.time, plain.z)
-        try:
-            run = Variation(self.flow, values, plain.log, start, begin, *places, plain.course, plain.changes)
-        except ValueError:
-            return None
-        return replace(plain, rate=run.rate, D=run.D, of_time=run.of_time)

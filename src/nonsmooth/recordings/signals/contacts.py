@@ -7,7 +7,7 @@ a force that the free motion does not have.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
@@ -18,16 +18,19 @@ from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.smoothing import smooth
 from nonsmooth.results.labels import labelled
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Positive, at_least
 
 
+@checked
 def impacts(
     time: ArrayLike,
     x: Any,
     *,
-    resolution: float | None = None,
-    noise: float = 0.0,
-    significance: float = 5.0,
-    window: int = 6,
+    resolution: Positive | None = None,
+    noise: Annotated[float, at_least(0)] = 0.0,
+    significance: Positive = 5.0,
+    window: Annotated[int, at_least(4), "it is the number of samples on either side"] = 6,
 ) -> xr.Dataset:
     """Instants at which the velocity jumps between two samples (hard impacts).
 
@@ -60,8 +63,6 @@ def impacts(
     ValueError
         If values are missing, or the record is shorter than two windows.
     """
-    if window < 4:
-        raise ValueError(f"window must be at least 4 samples on either side, got {window}")
     t, values = signal(time, x, least=2 * window, purpose="finding impacts")
     if resolution is None:
         # Fourth differences of a smooth motion are noise; a few kinks do not move their median.
@@ -306,25 +307,22 @@ def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float
         begin, end, cut = intervals(found, gap)
     speed, own = (np.interp([begin, end], t, found[name].values) for name in ("v", "x_error"))
     errors = np.hypot(own, gap_error) / np.maximum(np.abs(speed), 1e-300)
-    depth, seen = np.zeros(len(begin)), np.zeros(len(begin), np.int64)
-    for k, (b, e) in enumerate(zip(begin, end, strict=True)):
-        here = (t >= b) & (t <= e)
-        seen[k] = np.count_nonzero(here)
-        depth[k] = position[here].max() - gap if here.any() else 0.25 * (e - b) * abs(speed[0][k])
+    first, behind = np.searchsorted(t, begin), np.searchsorted(t, end, "right")
+    deepest = [position[a:b].max(initial=-math.inf) - gap for a, b in zip(first, behind, strict=True)]
+    depth = np.where(behind > first, deepest, 0.25 * (end - begin) * np.abs(speed[0]))
     unit = unit_of(x)
-    second, metre = {"units": "s"}, {"units": unit}
     return xr.Dataset(
         {
             "begin": labelled("contact", begin, "begin of the contact", "s"),
             "end": labelled("contact", end, "end of the contact", "s"),
-            "begin_error": ("contact", errors[0], second),
-            "end_error": ("contact", errors[1], second),
+            "begin_error": ("contact", errors[0], {"units": "s"}),
+            "end_error": ("contact", errors[1], {"units": "s"}),
             "depth": labelled("contact", depth, "depth of the contact", unit),
             "v_begin": labelled("contact", speed[0], "velocity at the begin", f"{unit}/s"),
             "v_end": labelled("contact", speed[1], "velocity at the end", f"{unit}/s"),
-            "uncertain": labelled("contact", (depth < least) | (seen < 2) | cut, "contact is uncertain"),
-            "gap": ((), gap, metre),
-            "gap_error": ((), gap_error, metre),
+            "uncertain": labelled("contact", (depth < least) | (behind - first < 2) | cut, "contact is uncertain"),
+            "gap": ((), gap, {"units": unit}),
+            "gap_error": ((), gap_error, {"units": unit}),
             "stiffness": labelled((), stiffness, "stiffness of the support by the mass", "1/s^2"),
         }
     )

@@ -14,6 +14,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.spectrum import correlation_times
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Natural, Positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +82,9 @@ class HarmonicFit:
         return self.mean + np.cos(angle) @ self.amplitudes
 
 
+@checked
 def fit(
-    time: ArrayLike, x: Any, omega: float, n: int = 3, *, refine: bool = False, subharmonic: int = 1
+    time: ArrayLike, x: Any, omega: Positive, n: Natural = 3, *, refine: bool = False, subharmonic: Natural = 1
 ) -> HarmonicFit:
     """Fit a mean and ``n`` harmonics of ``omega`` to a signal; times may be uneven.
 
@@ -107,8 +110,6 @@ def fit(
     ValueError
         If the record is shorter than one period, has too few samples, or too low a rate for the highest harmonic.
     """
-    if not (math.isfinite(omega) and omega > 0) or n < 1 or subharmonic < 1:
-        raise ValueError(f"omega must be positive, n and subharmonic at least 1; got {omega!r}, {n!r}, {subharmonic!r}")
     t, values = signal(time, x, least=2 * n + 4, purpose=f"a fit of {n} harmonics")
     base = omega / subharmonic
     length = t[-1] - t[0]

@@ -165,15 +165,15 @@ def single_contacts(
 def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type, str]]) -> xr.Dataset:
     """Impacts with their restitution, of rows whose velocities are (value, error); ``more``: other columns."""
 
-    def column(name: str, kind: type, place: int | None = None) -> NDArray[Any]:
-        return np.array([row[name] if place is None else row[name][place] for row in rows], kind)
+    def column(name: str, kind: type = float) -> NDArray[Any]:
+        return np.array([row[name] for row in rows], kind)
 
     data: dict[str, Any] = {}
     times = {"impact_time": "time of the impact", "duration": "from the last free sample to the next"}
     for name, long_name in times.items():
-        data[name] = labelled("impact", column(name, float), long_name, "s")
-    (v0, e0), (v1, e1) = ([column(name, float, place) for place in (0, 1)] for name in ("v_before", "v_after"))
-    for word, v, error in (("before", v0, e0), ("after", v1, e1)):
+        data[name] = labelled("impact", column(name), long_name, "s")
+    (v0, e0), (v1, e1) = sides = [column(f"v_{word}").reshape(-1, 2).T for word in ("before", "after")]
+    for word, (v, error) in zip(("before", "after"), sides, strict=True):
         data[f"v_{word}"] = labelled("impact", v, f"velocity {word} the impact")
         data[f"v_{word}_error"] = ("impact", error)
     with np.errstate(divide="ignore", invalid="ignore"):

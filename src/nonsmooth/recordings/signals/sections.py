@@ -6,7 +6,7 @@ order 3 or 5. An impact between two samples is not interpolated across: each sid
 
 from __future__ import annotations
 
-from typing import Any, TypedDict, Unpack
+from typing import Annotated, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 import xarray as xr
@@ -16,6 +16,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.phase import DrivePhase
 from nonsmooth.results.labels import labelled
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Default, at_least
 
 
 def first_zero(x: FloatArray, y: FloatArray) -> float:
@@ -33,11 +35,17 @@ class Known(TypedDict, total=False):
     a: ArrayLike | None
     x_error: ArrayLike | None
     v_error: ArrayLike | None
-    impacts: ArrayLike
+    impacts: Annotated[ArrayLike, Default(())]
 
 
+@checked
 def stroboscopic(
-    time: ArrayLike, x: Any, v: ArrayLike, drive_phase: DrivePhase, phase: float = 0.0, **known: Unpack[Known]
+    time: ArrayLike,
+    x: Any,
+    v: ArrayLike,
+    drive_phase: DrivePhase,
+    phase: Annotated[float, at_least(0, 1)] = 0.0,
+    **known: Unpack[Known],
 ) -> xr.Dataset:
     """Position and velocity once per turn of the drive.
 
@@ -64,8 +72,6 @@ def stroboscopic(
     ValueError
         If the record holds no instant of this phase.
     """
-    if not 0.0 <= phase <= 1.0:
-        raise ValueError(f"phase must lie between 0 and 1 turns, got {phase!r}")
     between = _Between(time, x, v, **known)
     instants = drive_phase.times(phase)
     instants = instants[(instants >= between.t[0]) & (instants <= between.t[-1])]
@@ -78,12 +84,13 @@ def stroboscopic(
     return _points(between, instants, instant_error, {"section": f"stroboscopic, phase {phase:g}"}, along=True)
 
 
+@checked
 def poincare(
     time: ArrayLike,
     x: Any,
     v: ArrayLike,
     *,
-    surface: str = "x",
+    surface: Literal["x", "v"] = "x",
     level: float = 0.0,
     rising: bool | None = True,
     **known: Unpack[Known],
@@ -104,8 +111,6 @@ def poincare(
     Dataset
         As :func:`stroboscopic`, and ``time_error(iterate)``. It may hold no point.
     """
-    if surface not in ("x", "v"):
-        raise ValueError(f"surface must be x or v, got {surface!r}")
     between = _Between(time, x, v, **known)
     which = 0 if surface == "x" else 1
     values = between.states[:, which] - level

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -20,21 +20,24 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import even_rate, signal, unit_of, whose
 from nonsmooth.results.labels import labelled
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Positive, at_least
 
 #: The derivative that is white noise, by the name of the model.
 MODELS = {"white_acceleration": 2, "white_jerk": 3, "white_snap": 4}
 
 
+@checked
 def smooth(
     time: ArrayLike,
     x: Any,
     *,
-    resolution: float | None,
-    noise: float = 0.0,
+    resolution: Positive | None,
+    noise: Annotated[float, at_least(0)] = 0.0,
     impacts: ArrayLike = (),
     contacts: Any = None,
-    model: str | None = None,
-    intensity: float | tuple[float, float] | None = None,
+    model: Literal["white_acceleration", "white_jerk", "white_snap", None] = None,
+    intensity: Any = None,
 ) -> xr.Dataset:
     """Kalman smoother (Rauch-Tung-Striebel) of a quantised record, its process noise found by maximum likelihood.
 
@@ -60,7 +63,7 @@ def smooth(
         Which derivative is white noise: the third, the fourth, the second. The default is the third, which bears
         contacts that nobody has found yet; where ``contacts`` are given (none, ``((), ())``, is an answer too) it is
         the fourth, whose errors are a half to a third.
-    intensity : float, optional
+    intensity : float or (float, float), optional
         Intensity of that noise where it is known, e.g. from a longer record of the same kind; with ``contacts``
         that outside and that inside, ``(outside, inside)``.
 
@@ -86,13 +89,7 @@ def smooth(
     Source: Rauch, Tung and Striebel, AIAA Journal 3 (1965) 1445-1450.
     """
     model = model or ("white_jerk" if contacts is None else "white_snap")
-    order = MODELS.get(model)
-    if order is None:
-        raise ValueError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
-    if resolution is not None and not (math.isfinite(resolution) and resolution > 0):
-        raise ValueError(f"{whose(x)}: resolution must be a positive length or None, got {resolution!r}")
-    if not (math.isfinite(noise) and noise >= 0):
-        raise ValueError(f"{whose(x)}: noise must be a standard deviation >= 0, got {noise!r}")
+    order = MODELS[model]
     t, values = signal(time, x, least=2 * order, purpose="smoothing", missing="keep")
     places = np.unique(np.asarray(impacts, float).ravel())
     if len(places) and not (t[0] < places[0] and places[-1] < t[-1]):
@@ -237,17 +234,16 @@ class _Nodes:
         states[:, 0] += self.offset
         errors = np.sqrt(np.maximum(np.einsum("kii->ki", self.P[1]), 0.0)) * sigma * units
         sample, before, after = (self.kind == kind for kind in range(3))
-        unit = unit_of(x)
-        speed = {"units": f"{unit}/s"}
-        at_impacts = {
-            "impact_time": labelled("impact", self.impacts, "time of the impact", "s"),
-            "impact_x": labelled("impact", states[before, 0], "position at the impact", unit),
-            "impact_x_error": ("impact", errors[before, 0], {"units": unit}),
-            "v_before": labelled("impact", states[before, 1], "velocity before the impact", f"{unit}/s"),
-            "v_before_error": ("impact", errors[before, 1], speed),
-            "v_after": labelled("impact", states[after, 1], "velocity after the impact", f"{unit}/s"),
-            "v_after_error": ("impact", errors[after, 1], speed),
-        }
+        at_impacts = {"impact_time": labelled("impact", self.impacts, "time of the impact", "s")}
+        for name, side, words in (
+            ("impact_x", before, "position at the impact"),
+            ("v_before", before, "velocity before the impact"),
+            ("v_after", after, "velocity after the impact"),
+        ):
+            k = int(name != "impact_x")
+            unit = unit_of(x) + "/s" * k
+            at_impacts[name] = labelled("impact", states[side, k], words, unit)
+            at_impacts[f"{name}_error"] = ("impact", errors[side, k], {"units": unit})
         attrs = {
             "method": "Kalman smoother (Rauch-Tung-Striebel)",
             "model": model,
@@ -295,11 +291,12 @@ def _stays(t: FloatArray, x: FloatArray, resolution: float) -> tuple[FloatArray,
     return np.repeat(lengths, lengths).astype(np.float64), time, value, 1.0 / shorter[use] ** 2
 
 
+@checked
 def savitzky_golay(
     time: ArrayLike,
     x: Any,
     *,
-    resolution: float,
+    resolution: Positive,
     window: int = 9,
     order: int = 4,
     impacts: ArrayLike = (),
@@ -337,8 +334,6 @@ def savitzky_golay(
 
     if window % 2 == 0 or not 2 <= order < window - 2:
         raise ValueError(f"window must be odd and order from 2 to window - 3, got window={window}, order={order}")
-    if not (math.isfinite(resolution) and resolution > 0):
-        raise ValueError(f"{whose(x)}: resolution must be a positive length, got {resolution!r}")
     t, values = signal(time, x, least=window, purpose="Savitzky-Golay smoothing")
     step = 1.0 / even_rate(t, x, "Savitzky-Golay smoothing")
     hits = np.unique(np.asarray(impacts, float).ravel())

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, unit_of, whose
 from nonsmooth.results.labels import labelled
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Natural, Positive
 
-#: Ways to find a peak between lines.
-INTERPOLATIONS = ("window", "parabola", "none")
 FINE = 32  # points per line in the table of a window's transform; a cubic between them is right to 1e-7
 
 
@@ -59,13 +59,14 @@ class Peak:
         return 2.0 * math.pi * self.error
 
 
+@checked
 def spectrum(
     x: Any,
-    rate: float | None = None,
+    rate: Positive | None = None,
     *,
-    window: str | tuple[Any, ...] = "hann",
-    padding: int = 1,
-    detrend: str | None = "constant",
+    window: Any = "hann",
+    padding: Natural = 1,
+    detrend: Literal["constant", "linear", None] = "constant",
 ) -> xr.Dataset:
     """One-sided spectrum of an evenly sampled signal.
 
@@ -103,12 +104,8 @@ def spectrum(
         if not hasattr(x, "dims") or x.ndim != 1 or x.dims[0] not in x.coords:
             raise ValueError("rate is needed: the sample rate in Hz, or a DataArray with its time")
         times = x[x.dims[0]]
-    elif not (math.isfinite(rate) and rate > 0):
-        raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
     else:
         times = np.arange(np.size(x)) / rate
-    if padding < 1 or detrend not in ("constant", "linear", None):
-        raise ValueError(f"padding must be at least 1 and detrend constant, linear or None: {padding!r}, {detrend!r}")
     t, values = signal(times, x, least=16, purpose="a spectrum")
     rate = even_rate(t, x, "a spectrum") if rate is None else rate
     n = len(values)
@@ -142,8 +139,13 @@ def spectrum(
     )
 
 
+@checked
 def peak(
-    spectrum: xr.Dataset, *, low: float | None = None, high: float | None = None, interpolation: str = "window"
+    spectrum: xr.Dataset,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+    interpolation: Literal["window", "parabola", "none"] = "window",
 ) -> Peak:
     """The largest peak of a spectrum between ``low`` and ``high`` Hz.
 
@@ -175,8 +177,6 @@ def peak(
     No method can have a smaller error than sqrt(6) sigma / (pi A T sqrt(N)) for a sinusoid of amplitude A in white
     noise sigma, N samples over the time T: Rife and Boorstyn, IEEE Trans. Information Theory 20 (1974) 591-598.
     """
-    if interpolation not in INTERPOLATIONS:
-        raise ValueError(f"interpolation must be one of {', '.join(INTERPOLATIONS)}, got {interpolation!r}")
     frequency, amplitude = spectrum.frequency.values, spectrum.amplitude.values
     padding = spectrum.attrs["padding"]
     first = np.searchsorted(frequency, low) if low is not None else min(2 * padding, len(frequency) - 1)
