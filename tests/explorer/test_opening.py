@@ -12,7 +12,7 @@ import nonsmooth as ns
 from nonsmooth.cli.main import main
 from nonsmooth.cli.study import read_study
 from nonsmooth.explorer.catalogue import Catalogue
-from nonsmooth.explorer.opening import opened_result, opened_study
+from nonsmooth.explorer.export import opened_result, opened_study
 
 STUDY = """
 [system]

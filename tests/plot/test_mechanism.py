@@ -8,8 +8,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.plot.mechanism import Sketch
-from nonsmooth.plot.parts import GROUND
-from nonsmooth.plot.pen import Pen, put
+from nonsmooth.plot.pen import GROUND, Pen, put
 from nonsmooth.plot.scheme import scheme_of
 
 E = ns.elements

@@ -37,7 +37,7 @@ def add(commands: Any) -> Any:
 
 def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.study import load_model, named_model, read_study
-    from nonsmooth.explorer.opening import opened_result, opened_study
+    from nonsmooth.explorer.export import opened_result, opened_study
     from nonsmooth.explorer.serve import explore
     from nonsmooth.results.store import load
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.parts import GROUND, Link, Scheme
-from nonsmooth.plot.pen import GREY, PALE, Part, Pen, put
+from nonsmooth.plot.pen import GREY, GROUND, PALE, Link, Part, Pen, Scheme, put
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.parameter import latex_name
 

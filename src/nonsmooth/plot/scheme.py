@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from nonsmooth.plot.parts import GROUND, Link, Scheme
+from nonsmooth.plot.pen import GROUND, Link, Scheme
 from nonsmooth.system.derived.expressions import SPEED
 from nonsmooth.system.parameter import latex_name
 
