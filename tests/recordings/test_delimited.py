@@ -98,7 +98,7 @@ def test_another_axis_need_not_rise() -> None:
         (b"# only\n", Options(), r"no table, only blank lines or comments"),
         (b"t,x,x\n0,1,2\n", Options(columns={"time": "t", "x": "x"}), r"2 columns are called 'x'"),
         (b"t,x\n0,1\n,5\n", Options(), r"line 3: .* has a value where there is no time"),
-        ((",".join(["t"] + ["c"] * 5000) + "\n").encode(), Options(), r"has 5001 columns; at most 4096"),
+        ((",".join(["t"] + ["c"] * 5000) + "\n").encode(), Options(), r"holds 5001 columns; at most 4096"),
     ],
 )
 def test_bad_files_say_where(data: bytes, options: Options, message: str) -> None:

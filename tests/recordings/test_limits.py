@@ -55,7 +55,7 @@ def test_the_channels_of_all_segments_count() -> None:
     one = b"Channels\t1400\n***End_of_Header***\nX_Value" + b"\tA" * 1400 + b"\n0\t1\n"
     head = b"LabVIEW Measurement\n***End_of_Header***\n"
     assert len(parse_recording(head + 2 * one, "x.lvm").runs) == 2
-    with pytest.raises(DataFileError, match="3 segments hold 4200 channels so far; at most 4096"):
+    with pytest.raises(DataFileError, match="holds 4200 channels in 3 segments so far; at most 4096"):
         parse_recording(head + 3 * one, "x.lvm")
 
 

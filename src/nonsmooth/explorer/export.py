@@ -1,6 +1,7 @@
 """Files of what a page shows: figures by ``nonsmooth.plot``, data, and the script or study file that makes them.
 
-And back: the first view of a page that opens on a study file or a result. Scripts are written from the record that a result carries, not from the page: what they compute is what was shown.
+And back: the first view of a page that opens on a study file or a result. Scripts are written from the record that a
+result carries, not from the page: what they compute is what was shown.
 """
 
 from __future__ import annotations

@@ -23,7 +23,6 @@ import xarray as xr
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.reading import (
-    MAX_COLUMNS,
     MAX_FILE_BYTES,
     Options,
     Reading,
@@ -147,12 +146,10 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
     digest = hashlib.sha256(data).hexdigest()
     reading = Reading(name=name, size=len(data), sha256=digest, **vars(options or Options()))
     if data.startswith(b"\x1f\x8b"):
-        limit = inflation_limit(len(data))
         with readable("unpacked", reading), gzip.open(io.BytesIO(data)) as packed:
-            data = packed.read(limit + 1)
-        if len(data) > limit:
-            why = f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself"
-            raise reading.error("", why)
+            data = packed.read(reading.left + 1)
+        reading.warrant(len(data), f"unpacks to more than {reading.left} bytes")
+        reading.left = inflation_limit(len(data))
     reading.format = format if format is not None else _detect(data, reading)
     read = import_module(f"nonsmooth.recordings.readers.{FORMATS[reading.format]}").read
     # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
@@ -235,8 +232,7 @@ def assemble(reading: Reading) -> Recording:
             traces.append(trace)
     if not traces:
         raise reading.error("", "holds no samples; expected at least one channel with values")
-    if len(traces) > MAX_COLUMNS:
-        raise reading.error("", f"holds {len(traces)} channels; at most {MAX_COLUMNS} are read")
+    reading.few(len(traces), "channels")
     _compare_units(traces, reading)
 
     runs: dict[str, dict[str, xr.Dataset]] = {}

@@ -186,6 +186,11 @@ class Reading(Options, Remarks):
     told: dict[str, Any] = field(default_factory=dict)  # by the file, of itself
     run_attrs: dict[str, dict[str, str]] = field(default_factory=dict)
     synthetic: bool = False
+    left: int = field(init=False)  # bytes that it may still become
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.left = inflation_limit(self.size)
 
     @property
     def says_axes(self) -> bool:
@@ -200,6 +205,18 @@ class Reading(Options, Remarks):
     def error(self, place: str, message: str) -> DataFileError:
         """The exception for something wrong at ``place`` (a line, a record, a member; may be empty)."""
         return DataFileError(": ".join(part for part in (self.name, place, message) if part))
+
+    def warrant(self, n_bytes: float, said: str, place: str = "") -> None:
+        """Take bytes off what the file may become, all its parts together; DataFileError where it warrants no more."""
+        if n_bytes > self.left:
+            why = f"{said}, more than a file of {self.size} bytes warrants; it may be made to exhaust memory"
+            raise self.error(place, why)
+        self.left -= int(n_bytes)
+
+    def few(self, count: int, what: str, place: str = "", most: int = MAX_COLUMNS) -> None:
+        """DataFileError where the file holds more of something than are read."""
+        if count > most:
+            raise self.error(place, f"holds {count} {what}; at most {most} are read")
 
 
 def is_axis_name(name: str, axis: str) -> bool:
@@ -258,21 +275,19 @@ _MAX_MEMBERS = 20_000
 
 
 class Archive:
-    """A ZIP file in memory. All pieces ever taken out of it, together, stay below ``inflation_limit``.
+    """A ZIP file in memory. All pieces ever taken out of it, together, are no more than its size warrants.
 
     What its directory says of sizes is not believed: bytes are counted as they come out.
     """
 
     def __init__(self, data: bytes, reading: Reading) -> None:
-        self._reading = reading
-        self._left = self._limit = inflation_limit(len(data))
+        self._reading, self._most = reading, reading.left
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             infos = self._zip.infolist()
         except Exception as error:  # of a damaged directory almost any
             raise reading.error("", f"is not a whole ZIP archive ({error})") from error
-        if len(infos) > _MAX_MEMBERS:
-            raise reading.error("", f"holds {len(infos)} members; at most {_MAX_MEMBERS} are read")
+        reading.few(len(infos), "members", most=_MAX_MEMBERS)
         self._infos = {info.filename.replace("\\", "/"): info for info in infos}
 
     @property
@@ -291,11 +306,5 @@ class Archive:
             raise self._reading.error(name, f"is packed by method {info.compress_type}; expected stored or deflated")
         with readable("unpacked", self._reading, name), self._zip.open(info) as opened:
             while piece := opened.read(_PIECE):
-                self._left -= len(piece)
-                if self._left < 0:
-                    raise self._reading.error(
-                        name,
-                        f"unpacks to more than {self._limit} bytes, more than a file of {self._reading.size} bytes "
-                        "warrants; it may be made to exhaust memory",
-                    )
+                self._reading.warrant(len(piece), f"unpacks to more than {self._most} bytes", name)
                 yield piece

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from nonsmooth.recordings.readers.fields import Field, FieldTable, label, traces_of
 from nonsmooth.recordings.readers.loaders import load
 from nonsmooth.recordings.reading import (
-    MAX_COLUMNS,
     MAX_DEPTH,
     Group,
     Reading,
@@ -64,8 +63,7 @@ def read(data: bytes, reading: Reading) -> None:
         reading.run_attrs.setdefault(run, {}).update(node.notes | notes)
         for part in [node] if key or reading.rate else _by_rate(run, node, reading):
             reading.traces += traces_of(_table(run, path, part, key, reading), reading)
-        if len(reading.traces) > MAX_COLUMNS:
-            raise reading.error("", f"holds more than {MAX_COLUMNS} channels")
+        reading.few(len(reading.traces), "channels")
 
 
 def _by_rate(run: str, node: Group, reading: Reading) -> list[Group]:

@@ -231,8 +231,8 @@ def parse(pieces: Iterable[bytes], reading: Reading) -> Experiment:
         nonlocal run, segment
         nested.pop()
         if name == "DataSegmentElement" and segment is not None:
-            if len(found.segments) >= 4 * MAX_COLUMNS:
-                raise error(f"holds more than {4 * MAX_COLUMNS} blocks of data")
+            place = f"main.xml, line {parser.CurrentLineNumber}"
+            reading.few(len(found.segments), "blocks of data", place, 4 * MAX_COLUMNS)
             if segment.values:
                 found.segments.append(segment)
             elif len(found.empty) < MAX_COLUMNS:

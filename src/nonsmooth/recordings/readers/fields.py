@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.recordings.reading import (
-    MAX_COLUMNS,
     TIME_SCALES,
     Reading,
     Trace,
@@ -117,8 +116,7 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
         known[held] = True
         clock[held], unit = _along(axis, table, reading)
     runs = _runs(table, numbers, reading)
-    if len(runs) * (len(fields) + 1) > MAX_COLUMNS:
-        raise reading.error("", f"holds {len(fields) + 1} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
+    reading.few(len(runs) * (len(fields) + 1), f"columns, {len(fields) + 1} in each of {len(runs)} runs")
     for one in fields:
         rows = np.arange(table.rows) if one.rows is None else one.rows
         if one.values.dtype.kind == "c":
@@ -189,8 +187,7 @@ def _runs(table: FieldTable, numbers: Field | None, reading: Reading) -> list[tu
         bad = np.flatnonzero(~np.isfinite(values))[0]
         raise reading.error(row_of(bad, table.lines), f"the number of the run is {values[bad]}")
     found, first = np.unique(values, return_index=True)
-    if len(found) > MAX_COLUMNS:
-        raise reading.error("", f"holds {len(found)} runs; at most {MAX_COLUMNS} are read")
+    reading.few(len(found), "runs")
     return [(f"Run #{value:.12g}", values == value) for value in found[np.argsort(first)]]
 
 

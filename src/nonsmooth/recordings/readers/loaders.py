@@ -21,11 +21,9 @@ import numpy as np
 from nonsmooth.recordings.readers.matlab import load_hdf5, load_v5
 from nonsmooth.recordings.readers.text_table import number
 from nonsmooth.recordings.reading import (
-    MAX_COLUMNS,
     Archive,
     Group,
     Reading,
-    inflation_limit,
     is_axis_name,
     needed,
     readable,
@@ -71,8 +69,8 @@ def _arrow(data: bytes, reading: Reading) -> Loaded:
     if data.startswith(b"PAR1"):
         opened = needed("pyarrow.parquet", "pyarrow", reading).ParquetFile(held)
         shape = (opened.metadata.num_rows, opened.metadata.num_columns)
-        if math.prod(shape) * 8 > inflation_limit(len(data)) or shape[1] > MAX_COLUMNS:
-            raise reading.error("", f"says it holds {shape[0]} rows of {shape[1]} columns, more than it warrants")
+        reading.few(shape[1], "columns")
+        reading.warrant(8 * math.prod(shape), f"says it holds {shape[0]} rows of {shape[1]} columns")
         table = opened.read(use_threads=False)
     else:
         table = pyarrow.ipc.open_file(held, options=pyarrow.ipc.IpcReadOptions(use_threads=False)).read_all()
@@ -141,8 +139,7 @@ def _measured(data: bytes, reading: Reading) -> Loaded:
     groups: dict[str, Any] = {}
     with asammdf.MDF(io.BytesIO(data)) as opened:
         cycles = sum(group.channel_group.cycles_nr * len(group.channels) for group in opened.groups)
-        if 8 * cycles > inflation_limit(len(data)):
-            raise reading.error("", f"says it holds {cycles} samples, more than a file of {len(data)} bytes warrants")
+        reading.warrant(8 * cycles, f"says it holds {cycles} samples")
         for k, held in enumerate(opened.groups):
             group = Group()
             group.run = "Run #1"
@@ -160,8 +157,7 @@ def _tdms(data: bytes, reading: Reading) -> Loaded:
     nptdms = needed("nptdms", "npTDMS", reading)
     check_layout(data, reading)
     with _heard(reading), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
-        if sum(len(group.channels()) for group in opened.groups()) > MAX_COLUMNS:
-            raise reading.error("", f"holds more than {MAX_COLUMNS} channels")
+        reading.few(sum(len(group.channels()) for group in opened.groups()), "channels")
         found = {}
         for group in opened.groups():
             notes = {f"property_{key}": value for key, value in _plain(group.properties).items()}

@@ -48,15 +48,11 @@ def read(data: bytes, reading: Reading) -> None:
     while rows.following is not None:
         line, first = rows.following
         place, count = f"line {line}", count + 1
-        if count > _MAX_SEGMENTS:
-            raise reading.error(place, f"holds more than {_MAX_SEGMENTS} segments")
+        reading.few(count, "segments", place, _MAX_SEGMENTS)
         header = _keys(lines, reading, f"the segment's header that begins in {place}", first)
         names = _names(header, lines, line, clocks, reading)
         channels += len(names)
-        if channels > MAX_COLUMNS:
-            raise reading.error(
-                place, f"its {count} segments hold {channels} channels so far; at most {MAX_COLUMNS} are read"
-            )
+        reading.few(channels, f"channels in {count} segments so far", place)
         pairs = [text for name in names for text in (f"X_Value of {name}", name)]
         labels = pairs if clocks == "Multi" else ["X_Value", *names]
         wanted = range(clocks == "No", len(labels))

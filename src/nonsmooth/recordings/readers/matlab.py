@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Reading, inflation_limit, readable
+from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Reading, readable
 
 _HEADER = 128
 _INT8, _INT32, _MATRIX, _COMPRESSED = 1, 5, 14, 15
@@ -37,18 +37,15 @@ def load_v5(data: bytes, reading: Reading) -> dict[str, Any]:
     order = "<" if data[126:128] == b"IM" else ">"
     # The offset of a part that only objects use is cleared with them.
     plain = bytearray(data[:116] + b"\0" * 8 + data[124:_HEADER])
-    left = inflation_limit(len(data))
     for kind, body, position in _elements(memoryview(data), order, "variable at ", reading, _HEADER):
         place = f"variable at byte {position}"
         if kind == _COMPRESSED:
             unpacker = zlib.decompressobj()
             with readable("unpacked", reading, place):
-                unpacked = unpacker.decompress(body, left + 1)
-            if len(unpacked) > left:
-                raise reading.error(place, f"unpacks to more than {left} bytes, more than the file's size warrants")
+                unpacked = unpacker.decompress(body, reading.left + 1)
+            reading.warrant(len(unpacked), f"unpacks to more than {reading.left} bytes", place)
             if not unpacker.eof:
                 raise reading.error(place, "cannot be unpacked, it is cut short")
-            left -= len(unpacked)
             kind, body, _ = next(_elements(memoryview(unpacked), order, f"{place}, ", reading), (0, body, 0))
         if kind != _MATRIX:
             raise reading.error(place, f"is of type {kind}, expected a matrix (14) or a packed one (15)")
@@ -141,7 +138,7 @@ def load_hdf5(data: bytes, reading: Reading, *, matlab: bool) -> dict[str, Any]:
     """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
     import h5py
 
-    left, members = inflation_limit(len(data)), 16 * MAX_COLUMNS  # of what a file may hold
+    members = 16 * MAX_COLUMNS  # that a file may hold
 
     def of_group(group: Any, depth: int) -> dict[str, Any]:
         if depth > MAX_DEPTH:
@@ -164,7 +161,7 @@ def load_hdf5(data: bytes, reading: Reading, *, matlab: bool) -> dict[str, Any]:
         return found
 
     def value_of(item: Any, place: str, depth: int) -> Any:
-        nonlocal left, members
+        nonlocal members
         members -= 1
         if members < 0:
             raise reading.error(place, f"the file holds more than {16 * MAX_COLUMNS} arrays")
@@ -185,11 +182,9 @@ def load_hdf5(data: bytes, reading: Reading, *, matlab: bool) -> dict[str, Any]:
             return None
         if item.shape is None:
             return np.empty(0)
-        left -= item.size * max(1, item.dtype.itemsize)
-        if left < 0 or item.size > max(4096, 1100 * item.id.get_storage_size()):
-            raise reading.error(
-                place, f"says it holds {item.shape} values, more than a file of {reading.size} bytes warrants"
-            )
+        stored = item.size <= max(4096, 1100 * item.id.get_storage_size())
+        claimed = item.size * max(1, item.dtype.itemsize) if stored else math.inf
+        reading.warrant(claimed, f"says it holds {item.shape} values", place)
         values = np.asarray(item[()])
         if refers:
             held = [

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import IntArray
-from nonsmooth.recordings.reading import MAX_COLUMNS, Reading
+from nonsmooth.recordings.reading import Reading
 
 #: Line number and fields.
 Row = tuple[int, list[str]]
@@ -74,8 +74,7 @@ def rows(lines: Iterable[str], delimiter: str, reading: Reading, first_line: int
 
 def checked_header(fields: list[str], line: int, reading: Reading) -> list[str]:
     """The names of the columns, stripped; DataFileError if there are absurdly many."""
-    if len(fields) > MAX_COLUMNS:
-        raise reading.error(f"line {line}", f"has {len(fields)} columns; at most {MAX_COLUMNS} are read")
+    reading.few(len(fields), "columns", f"line {line}")
     return [field.strip() for field in fields]
 
 
