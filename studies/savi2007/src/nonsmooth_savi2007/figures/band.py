@@ -37,10 +37,6 @@ def general_form(system: System) -> System:
     return System.from_text(json.dumps({key: value for key, value in content.items() if key != "bands"}))
 
 
-def _compute(settings: Settings) -> Datasets:
-    return {"error": _errors(settings), "grazing": _grazing(settings)}
-
-
 def _errors(settings: Settings) -> xr.Dataset:
     """Distance to the exact flow after four periods on the attractor, in units of 1 mm and 1 cm/s."""
     etas = ETAS[1:-1] if settings.quick else ETAS
@@ -189,5 +185,13 @@ FIGURES = (
     Figure(
         "fig02", 2, "Regions and surfaces", lambda settings: {}, _draw_regions, lambda data: _ABOUT_REGIONS, (1.0, 0.42)
     ),
-    Figure("eta", None, "The choice of eta", _compute, _draw, _caption, (1.0, 0.52)),
+    Figure(
+        "eta",
+        None,
+        "The choice of eta",
+        lambda settings: {"error": _errors(settings), "grazing": _grazing(settings)},
+        _draw,
+        _caption,
+        (1.0, 0.52),
+    ),
 )

@@ -40,7 +40,10 @@ def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, 
     found, notes = dict(runs), []
     sign, sentence = towards_support([run for name in _AT_SUPPORT for run in runs.get(name, ())])
     if sign < 0:
-        found = {name: tuple(_turned(run) for run in rows) for name, rows in found.items()}
+        found = {
+            name: tuple(run if run.x is None else replace(run, x=run.x.copy(data=-run.x.values)) for run in rows)
+            for name, rows in found.items()
+        }
         notes.append(sentence)
     _swapped(found)
     for name in ("springs", "support"):
@@ -127,7 +130,3 @@ def _slope(run: Run) -> float:
 def few(names: Sequence[str]) -> str:
     """The first three names."""
     return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
-
-
-def _turned(run: Run) -> Run:
-    return run if run.x is None else replace(run, x=run.x.copy(data=-run.x.values))

@@ -211,7 +211,9 @@ def shoot_contacts(
     if not touched:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     for run in touched:
-        known, span = known_before(run, decay, mark), _span(run)
+        # from where the car is farthest from the support
+        begin = run.time[np.argmin(run.positions[run.time < run.time[0] + _BEGINS])]
+        known, span = known_before(run, decay, mark), (begin, min(run.time[-1], begin + _LONGEST))
         first = {"kappa": kappa, "gamma": gamma, **known}
         try:
             found = fit_contact(run, known, first, span)
@@ -254,13 +256,6 @@ def shoot_contacts(
 def _touches(run: Run, rest: float) -> bool:
     """Return whether the car comes near enough to the support: the screw's reading may be off by a millimetre."""
     return run.positions.max() > rest + (run.gap - 1e-3 if run.gap < 2e-3 else 0.5 * run.gap)
-
-
-def _span(run: Run) -> tuple[float, float]:
-    """Part of a run that is fitted: from where the car is farthest from the support."""
-    early = run.time < run.time[0] + _BEGINS
-    begin = run.time[np.argmin(run.positions[early])]
-    return begin, min(run.time[-1], begin + _LONGEST)
 
 
 def _excess(found: ParameterSet, decay: DecayFit) -> float:

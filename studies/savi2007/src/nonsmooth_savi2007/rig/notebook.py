@@ -56,7 +56,10 @@ def write_session(
         lines.append("]")
     (place / "session.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     beside.parent.mkdir(parents=True, exist_ok=True)
-    beside.write_text("\n".join(_truth(rig)) + "\n", encoding="utf-8")
+    on = ", ".join(rig.on) or "none"
+    lines = [f"# What the virtual rig with seed {rig.seed} really is. Features that are on: {on}.", "[truth]"]
+    lines += [f"{name} = {value!r}    # {UNITS[name]}".rstrip(" #") for name, value in rig.truth.items()]
+    beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return place
 
 
@@ -94,12 +97,6 @@ def _apparatus(rig: VirtualRig) -> list[str]:
         ruler = round(max(length + spread * 5e-3 * rng.standard_normal(), 0.01), 3)
         known.append(f"string_length = {{ value = {ruler}, uncertainty = 0.005 }}    # m, by ruler")
     return known
-
-
-def _truth(rig: VirtualRig) -> list[str]:
-    on = ", ".join(rig.on) or "none"
-    lines = [f"# What the virtual rig with seed {rig.seed} really is. Features that are on: {on}.", "[truth]"]
-    return lines + [f"{name} = {value!r}    # {UNITS[name]}".rstrip(" #") for name, value in rig.truth.items()]
 
 
 def _run(name: str, attrs: Mapping[Any, Any]) -> str:
