@@ -3,8 +3,8 @@
 The length of a Taylor step is read off its last coefficients. They tell nothing of a term that is below rounding at
 the beginning of the step and large at its end: a saturated tanh, the flank of a bell, a wall x**40. Such a term rests
 on a function whose singularities (or growth) lie off the solution; what decides is its argument, and it is largest, or
-turns over, where the argument vanishes or is stationary. These *watched arguments* become further rows
-of the generated jets, and ``kernels.series.taylor.trusted`` compares the polynomial with the equations at their zeros and
+turns over, where the argument vanishes or is stationary. These *watched arguments* become further rows of the
+generated jets, and ``kernels.series.taylor.trusted`` compares the polynomial with the equations at their zeros and
 extremes.
 
 Right-hand sides without such functions need no comparison: polynomials of a low degree in the states, sines, cosines
