@@ -101,8 +101,8 @@ def coverage(case: Case, seeds: Iterable[int], folder: Path) -> Row:
     return Row(case, np.array(far).reshape(-1, len(case.find)), said, [fit["seconds"] for fit in fits.values()])
 
 
+def faults(rows: Sequence[Row]) -> list[str]:
     """Faults of forty seeds of each system, where intervals of 95 % are not that."""
-    """What of forty seeds of each system is not as intervals of 95 % should be."""
     found = []
     for row in rows:
         z = row.far

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
+from nonsmooth.plot import style
 from nonsmooth.plot.labels import in_lines
 from nonsmooth.plot.palette import nth
 
@@ -154,8 +155,8 @@ def test_a_load_is_broken_where_the_motion_jumps() -> None:
 
 
 def test_lines_of_ones_own_have_the_colours_of_the_package() -> None:
-    for style in (ns.plot.journal, ns.plot.slides):
-        with style():
+    for chosen in (ns.plot.journal, ns.plot.slides):
+        with chosen():
             ax = plt.figure().add_subplot()
             ax.plot(np.zeros((2, 6)))
         assert [line.get_color().lstrip("#") for line in ax.lines] == [nth(k).lstrip("#") for k in range(6)]
@@ -228,3 +229,17 @@ def test_contours_take_two_rows(preloaded) -> None:
     chart = ns.chart(preloaded, {"w": [1.0, 1.1], "F": [1.0]}, progress=False)
     with pytest.raises(ValueError, match="two values and more of each parameter"):
         ns.plot.chart(chart, show="q1_maximum", contours={"q1_maximum": 0.5})
+
+
+@pytest.mark.parametrize(("place", "way"), [(0.1, 1.0), (0.9, -1.0)])
+def test_a_label_over_another_moves_towards_the_middle(place: float, way: float) -> None:
+    _, ax = plt.subplots()
+    labels = [
+        ax.annotate("a jump", (0.5, place), xycoords="axes fraction", xytext=(0, 0), textcoords="offset points")
+        for _ in range(3)
+    ]
+    style.apart(ax, labels)
+    heights = np.array([label.xyann[1] for label in labels])
+    assert heights[0] == 0.0 and (np.diff(heights) * way > 0.0).all()
+    boxes = [label.get_window_extent() for label in labels]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])

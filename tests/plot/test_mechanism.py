@@ -274,5 +274,6 @@ def test_a_law_that_is_longer_than_its_gap_is_not_written() -> None:
         links = scheme_of(ns.mechanical(1, 0.1, 1, parameters=values, elements={"stop": stop})).links
         return str(links[-1].words)
 
+    assert gap(0.0) == ""
     assert r"\cos" in gap(lambda t, u, p: p.d + p.A * np.cos(p.w * t))
     assert gap(lambda t, u, p: p.d + p.A * np.cos(p.w * t + p.phi) + p.B * np.sin(2 * p.w * t - p.phi)) == ""

@@ -103,6 +103,10 @@ BOMB = zlib.compress(struct.pack("<II", MATRIX, 40 << 20) + b"\0" * (40 << 20))
         (doubles("t", 1, 2, dims=(1, -2)), r"expected the flags and the dimensions of a matrix, got \(1, -2\)"),
         (doubles("t", 1, 2, dims=(1, 5)), r"cannot be read as a MATLAB file"),
         (struct_("s", x=matrix("", 1, (1, 2**30))), r"says it has 1073741824 elements, which are not"),
+        (
+            struct_("s", x=doubles("", 1, 2)).replace(struct.pack("<2i", 1, 1), struct.pack("<2i", 1, 9), 1),
+            r"says it has 9 elements, which are not",
+        ),
         (matrix("c", 1, (1000, 1000)), r"says it has 1000000 elements, which are not"),
         (chars("c", "abc").replace(struct.pack("<2i", 1, 3), struct.pack("<2i", 999, 999)), r"it has 998001 elements"),
         (struct.pack("<II", PACKED, len(BOMB)) + BOMB, r"unpacks to more than 16777216 bytes"),

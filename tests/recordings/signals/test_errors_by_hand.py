@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.signal
+import xarray as xr
 from motions import bounces, rms
 
-from nonsmooth.recordings.signals.contacts import impacts
+from nonsmooth.recordings.signals.contacts import impacts, intervals
 from nonsmooth.recordings.signals.phase import DrivePhase
 from nonsmooth.recordings.signals.sections import poincare, stroboscopic
 from nonsmooth.recordings.signals.steady import steady_response
@@ -86,3 +87,19 @@ def test_the_noise_that_is_given_is_in_the_error_of_an_impacts_instant() -> None
         assert len(found["impact_time"]) == len(when)
         z.append((found["impact_time"].values - when) / found["impact_time_error"].values)
     assert 0.6 < rms(np.ravel(z)) < 1.4
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "expected"), [(0.0, 12.4, [1, 0, 1]), (2.0, 12.4, [0, 1]), (0.0, 10.0, [1, 0])]
+)
+def test_contacts_that_the_record_cuts_off(first: float, last: float, expected: list[int]) -> None:
+    """cos t exceeds 1/2 within pi / 3 of each multiple of 2 pi."""
+    t = np.arange(first, last, 0.01)
+    found = xr.Dataset({"time": t, "x": ("time", np.cos(t)), "v": ("time", -np.sin(t))})
+    begin, end, cut = intervals(found, 0.5)
+    middle = (
+        2 * np.pi * np.array([k for k in (0, 1, 2) if first < 2 * np.pi * k + np.pi / 3 and 2 * np.pi * k < last + 1])
+    )
+    assert begin == pytest.approx(np.maximum(middle - np.pi / 3, t[0]), abs=1e-8)
+    assert end == pytest.approx(np.minimum(middle + np.pi / 3, t[-1]), abs=1e-8)
+    assert cut.tolist() == [bool(one) for one in expected]
