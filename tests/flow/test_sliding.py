@@ -257,3 +257,126 @@ def test_four_fields_that_leave_the_motion_on_two_surfaces_open() -> None:
         ns.simulate(system, duration=5.0, start=[-0.5, -1.0, 0.2])
     assert caught.value.status == "chatter"
     assert caught.value.time < 1.5
+
+
+def four_fields(speed: dict[str, Any], names: tuple[str, ...], one: Any, two: Any) -> ns.System:
+    """Modes m and p either side of two surfaces, each with its field."""
+    return ns.System(
+        states=names,
+        parameters={},
+        modes=speed,
+        indicators={"one": one, "two": two},
+        transitions=[
+            ns.Surface("one", below="mm", above="pm"),
+            ns.Surface("one", below="mp", above="pp"),
+            ns.Surface("two", below="mm", above="mp"),
+            ns.Surface("two", below="pm", above="pp"),
+        ],
+    )
+
+
+@pytest.mark.parametrize("method", ["taylor", "rkf45"])
+@pytest.mark.parametrize("add_up", [False, True])
+def test_a_pole_on_another_side_does_not_end_a_run(add_up: bool, method: str) -> None:
+    """Four fields: sliding along x = 0 beyond y = 10 has a pole at z = 0.5, which a motion on y < 10 passes, z = t.
+    Relays that add up: along x = 0 it has one at z = 0, which x' = 0.3 - z, y' = 1.5 passes at z = t - 1."""
+    one, two = (lambda t, u, p: u.x), (lambda t, u, p: u.y - 10)
+    if add_up:
+        signs = {"mm": (-1, -1), "pm": (1, -1), "mp": (-1, 1), "pp": (1, 1)}
+        speed = {k: (lambda t, u, p, a=a, b=b: (0.3 - a * u.z, 0.5 * a - b, 1)) for k, (a, b) in signs.items()}
+        start, times, last = [5.0, 0.0, -1.0], [], [5.6, 3.0, 1.0]
+    else:
+        speed = {
+            "mm": lambda t, u, p: (1, 0, 1),
+            "pm": lambda t, u, p: (-1, 0, 1),
+            "mp": lambda t, u, p: (u.z, 0, 0),
+            "pp": lambda t, u, p: (1 - u.z, 1, 0),
+        }
+        start, times, last = [0.1, 0.0, 0.0], [0.1], [0.0, 0.0, 2.0]
+    run = ns.simulate(four_fields(speed, ("x", "y", "z"), one, two), start=start, duration=2.0, method=method)
+    assert run.crossing_time.values == pytest.approx(times, abs=1e-12)
+    assert run.u.values[-1] == pytest.approx(last, abs=1e-9)
+
+
+def test_four_fields_of_four_states_are_there_in_seconds() -> None:
+    """Filippov's quotients are not multiplied out: that took minutes. The first crossing is that of SciPy."""
+    random = np.random.default_rng(0)
+    A, b, c = random.normal(size=(4, 4, 4)), random.normal(size=(4, 4)), random.normal(size=(4, 4))
+    k, m = random.normal(size=(2, 4)), random.normal(size=2)
+    began = process_time()
+    speed = {
+        mode: (lambda t, u, p, i=i: A[i] @ u - 3 * np.array([*u]) + b[i] + c[i] * np.cos(t + i))
+        for i, mode in enumerate(("mm", "pm", "mp", "pp"))
+    }
+    system = four_fields(
+        speed,
+        ("x0", "x1", "x2", "x3"),
+        lambda t, u, p: k[0] @ u - 1 - m[0] * np.cos(t),
+        lambda t, u, p: k[1] @ u - 1 - m[1] * np.sin(t),
+    )
+    run = ns.simulate(system, duration=0.2, method="rkf45")
+    assert process_time() - began < 20
+    assert run.status == 0
+    assert len(system.modes) == 12  # four, four that slide, and four from which motion is not unique
+
+
+LOWER = {"mm": (1, 1), "pm": (-1, 1)}  # both lead to x = 0, where motion goes up to y = 0: it is there at t = 1
+
+
+@pytest.mark.parametrize(
+    ("upper", "rate"),
+    [
+        ({"mp": (2, 0.25), "pp": (2, 2)}, (2, 2)),  # off both surfaces
+        ({"mp": (-2, 2), "pp": (-1, 0.5)}, (-2, 2)),
+        ({"mp": (1, 1), "pp": (-3, 2)}, (0, 1.25)),  # on along x = 0
+        ({"mp": (2, -1), "pp": (2, -1)}, (0.5, 0)),  # along y = 0, with half of pm and half of pp
+        ({"mp": (1, -1), "pp": (-1, -1)}, (0, 0)),  # it stays on both
+    ],
+)
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_where_two_surfaces_meet_the_one_way_on_is_taken(
+    upper: dict[str, Any], rate: tuple[float, float], method: str
+) -> None:
+    """Constant fields: each way by hand, and all others are closed (their rates lead back)."""
+    speed = {mode: (lambda t, u, p, v=v: v) for mode, v in {**LOWER, **upper}.items()}
+    system = four_fields(speed, ("x", "y"), lambda t, u, p: u.x, lambda t, u, p: u.y)
+    run = ns.simulate(system, start=[0.25, -1.0], duration=3.0, method=method)
+    assert run.u.values[-1] == pytest.approx([2 * v for v in rate], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "upper",
+    [
+        {"mp": (-1, 1), "pp": (1, 1)},  # off to either side
+        {"mp": (-1, 1), "pp": (2, -1)},  # off to the left, or along y = 0 to the right
+    ],
+)
+def test_where_several_ways_lead_on_from_two_surfaces_the_run_says_so(upper: dict[str, Any]) -> None:
+    speed = {mode: (lambda t, u, p, v=v: v) for mode, v in {**LOWER, **upper}.items()}
+    system = four_fields(speed, ("x", "y"), lambda t, u, p: u.x, lambda t, u, p: u.y)
+    with pytest.raises(ns.SolveError, match="a second surface, from which several ways lead on") as caught:
+        ns.simulate(system, start=[0.25, -1.0], duration=3.0)
+    assert caught.value.status == "not_unique"
+    assert caught.value.time == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_surface_that_ends_at_another_one() -> None:
+    """Behind y = 0 there is one field, and no surface x = 0: sliding ends there."""
+    system = ns.System(
+        states=["x", "y"],
+        parameters={},
+        modes={
+            "left": lambda t, u, p: (1, 1),
+            "right": lambda t, u, p: (-1, 1),
+            "top": lambda t, u, p: (0.5, 0.25),
+        },
+        indicators={"one": lambda t, u, p: u.x, "two": lambda t, u, p: u.y},
+        transitions=[
+            ns.Surface("one", below="left", above="right"),
+            ns.Surface("two", below="left", above="top"),
+            ns.Surface("two", below="right", above="top"),
+        ],
+    )
+    run = ns.simulate(system, start=[0.25, -1.0], duration=3.0)
+    assert run.crossing_time.values == pytest.approx([0.25, 1.0], abs=1e-12)
+    assert run.u.values[-1] == pytest.approx([1.0, 0.5], abs=1e-12)

@@ -95,13 +95,18 @@ def _not_unique(system: System, jump: TracedTransition) -> str:
     """A sentence where sliding ended without a unique way on; else nothing."""
     modes, declared = system.modes, len(system.declared.mode_names)
     if system.traced.ends(jump):
-        return (
-            f"Sliding in mode {modes[jump.source]!r} reached a point where the surface stops attracting from both "
-            "sides at once (a two-fold): motion from there is not unique. Change the model there, or start elsewhere."
+        where = (
+            "a second surface, from which several ways lead on (off both surfaces, or along one of them)"
+            if len(jump.rows) > 1
+            else "a point where the surface stops attracting from both sides at once (a two-fold)"
         )
-    if min(jump.source, jump.target) >= declared:
         return (
-            f"Both {modes[jump.source]!r} and {modes[jump.target]!r} slide to where a second surface attracts too, and "
+            f"Sliding in mode {modes[jump.source]!r} reached {where}: motion from there is not unique. Change the "
+            "model there, or start elsewhere."
+        )
+    if max(jump.source, jump.target) >= declared:
+        return (
+            f"{modes[jump.source]!r} and {modes[jump.target]!r} lead to where a second surface attracts too, and "
             "the vector fields beside these surfaces do not determine one field on both (it depends on the order in "
             "which they are combined). Write the motion on both surfaces as a mode of its own."
         )

@@ -133,7 +133,8 @@ def model_source(traced: Traced) -> str:
 
 def _asked(traced: Traced, mode: int) -> list[Expr]:
     """The indicators, zero in place of those that are not asked for in a mode: they are not computed there."""
-    idle = () if traced.decider is None else traced.decider.idle[mode]
+    every = traced.idle if traced.decider is None else traced.decider.idle
+    idle = every[mode] if every else ()
     return [Integer(0) if i in idle else h for i, h in enumerate(traced.indicators)]
 
 

@@ -155,16 +155,18 @@ def put_together(into: FloatArray, n: int, *tables: FloatArray) -> None:
 def linear_form(traced: Traced) -> LinearForm | None:
     """Return the linear form, or None where some mode has none."""
     taking = _TakingApart(traced)
-    fields = [taking.all_or_none(vector) for vector in traced.fields]
-    if any(vector is None for vector in fields):
-        return None
+    fields: list[list[Terms]] = []
+    for vector in traced.fields:  # the first that has none decides: sums of Filippov's quotients are long
+        if (found := taking.all_or_none(vector)) is None:
+            return None
+        fields.append(found)
     indicators = taking.all_or_none(traced.indicators)
     outputs = [taking.all_or_none(row) for row in traced.outputs]
     resets = [taking.all_or_none(_map_of(t, traced)) for t in traced.transitions]
     affine_resets = all(r is not None for r in resets)
     unknown: list[Terms] = [{"1": sympy.nan}] * len(fields)
     form = LinearForm(traced, taking.base, indicators is not None, affine_resets)
-    form.add([vector or [] for vector in fields], "A", "b", "c", "s")
+    form.add(fields, "A", "b", "c", "s")
     form.add([indicators or []], "ia", "ib", "ic", "is_")
     form.add([row or unknown for row in outputs], "oa", "ob", "oc", "os")
     form.add([(affine_resets and vector) or taking.identity() for vector in resets], "ra", "rb", "rc", "rs")

@@ -25,9 +25,10 @@ places of the two modes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,8 +48,10 @@ if TYPE_CHECKING:
 BEYOND = 10**9  # a state farther from the surface than the indicator's scale over this is not on it
 ON_SURFACE = 1e-12  # of the indicator's size: a start so near lies on the surface
 SEEDS = 3  # random points at which the orders of two surfaces are compared
+AGREE = 1e-9  # of their size: by how much values differ that are the same
 
 Field = tuple[sp.Expr, ...]
+Rows = tuple[TracedCondition, ...]
 
 
 def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str, float]) -> Traced:
@@ -61,9 +64,11 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
         level = [pair for pair in dict.fromkeys(build.meetings(pairs)) if pair not in pairs]
         pairs += level
     build.inherit(surfaces)
-    for pair in pairs:
+    asked = [pair for pair in pairs if not build.meets(pair)]
+    for pair in asked:
         build.add_transitions(pair)
-    return build.put_in(along=tuple(build.along))
+    build.add_meetings(surfaces, {(pair.indicator, mode) for pair in asked for mode in (pair.below, pair.above)})
+    return build.put_in(along=tuple(build.along), idle=tuple(build.idle()))
 
 
 @lru_cache(maxsize=256)
@@ -99,12 +104,19 @@ class _SlidingModes(Additions):
         self.sliding: dict[TracedSurface, int] = {}
         self.cells = [frozenset({mode}) for mode in range(len(self.modes))]  # declared modes that meet in each mode
         self.along = [frozenset[int]() for _ in self.modes]  # the indicators that each mode keeps at zero
+        self.quotients: list[
+            sp.Expr
+        ] = []  # those of fields that Filippov combines, one over the difference of two rates
 
     # Expressions
 
     def rate(self, pair: TracedSurface, mode: int) -> sp.Expr:
         """Lie derivative of the pair's indicator in a mode."""
-        return sp.expand(along(self.indicators[pair.indicator], self.traced.t, self.traced.u, self.fields[mode]))
+        return self.short(along(self.indicators[pair.indicator], self.traced.t, self.traced.u, self.fields[mode]))
+
+    def short(self, expression: sp.Expr) -> sp.Expr:
+        """The expression as a sum; as it is where it holds Filippov's quotients, which a sum would repeat."""
+        return expression if expression.has(*self.quotients) else sp.expand(expression)
 
     def at_surface(self, pair: TracedSurface, expression: sp.Expr) -> sp.Expr:
         """The expression without a state that the surface determines: a field may have no value far beyond it."""
@@ -114,7 +126,8 @@ class _SlidingModes(Additions):
         if not usable:
             return expression
         u = min(usable, key=lambda u: len(slopes[u].free_symbols))
-        return sp.expand(expression.subs(u, sp.expand(u - h / slopes[u])))
+        on_it = expression.subs(u, sp.expand(u - h / slopes[u]))
+        return on_it if expression.has(*self.quotients) else sp.expand(on_it)
 
     def size(self, pair: TracedSurface) -> sp.Expr:
         """Typical size of the indicator, from the states' scales."""
@@ -129,11 +142,20 @@ class _SlidingModes(Additions):
         quotient = a / b
         return sp.cancel(quotient) if quotient.free_symbols & self.moving else quotient
 
+    def turns(self, quotients: Field) -> bool:
+        """Return whether values say that they change with the state or the time: quick where ``ratio`` is not."""
+        values = numeric(self.traced, quotients)(*_somewhere(self.traced, parameters=1))
+        return bool((np.ptp(values, axis=0) > AGREE * np.abs(values).max(axis=0)).any())
+
     def direction(self, pair: TracedSurface) -> tuple[Field, sp.Expr, sp.Expr] | None:
         """(e, h_u e, length) of the difference of both fields, length * e with e constant; None where it turns."""
         below, above = self.fields[pair.below], self.fields[pair.above]
+        if any(entry.has(*self.quotients) for entry in (*below, *above)):
+            return None
         d = [sp.expand(a - b) for a, b in zip(above, below, strict=True)]
         length = min((entry for entry in d if entry != 0), key=sp.count_ops)
+        if self.turns(tuple(entry / length for entry in d)):
+            return None
         e = tuple(sp.Integer(0) if entry == 0 else self.ratio(entry, length) for entry in d)
         if any(entry.free_symbols & self.moving for entry in e):
             return None
@@ -150,7 +172,8 @@ class _SlidingModes(Additions):
         found: dict[tuple[frozenset[int], frozenset[int]], list[tuple[TracedSurface, Field, list[sp.Expr]]]] = {}
         for pair in pairs:
             below, above = self.rate(pair, pair.below), self.rate(pair, pair.above)
-            if sp.expand(below - above) == 0:
+            jump = self.short(below - above)
+            if jump == 0 or (jump.has(*self.quotients) and _agree(self.traced, (below,), (above,))):
                 continue
             key = self.cells[pair.below] | self.cells[pair.above], self.along[pair.below] | {pair.indicator}
             field, shown = self._filippov(pair, below, above)
@@ -176,7 +199,9 @@ class _SlidingModes(Additions):
         off = self.kappa * self.indicators[pair.indicator]
         found = self.direction(pair)
         if found is None:
-            a, b = (below + off) / (below - above), below / (below - above)
+            quotient = 1 / (below - above)
+            self.quotients.append(quotient)
+            a, b = (below + off) * quotient, below * quotient
             field = tuple(x if x == y else x + a * (y - x) for x, y in zip(first, second, strict=True))
             return field, [x if x == y else x + b * (y - x) for x, y in ends]
         e, slope, length = found
@@ -252,7 +277,7 @@ class _SlidingModes(Additions):
             # Behind the end of sliding the rate in its own mode vanishes, and its sign is known.
             self.jump(source, slid, TracedCondition(h, s), TracedCondition(leave[s], -s), TracedCondition(rate[-s], s))
             self.jump(slid, target, TracedCondition(leave[s], s))
-        attraction = sp.expand(rates[-1] - rates[1])
+        attraction = self.short(rates[-1] - rates[1])
         if slid is not None and attraction.free_symbols & self.moving:
             least = self.size(pair) * self.kappa / BEYOND
             gone = TracedCondition(
@@ -262,6 +287,108 @@ class _SlidingModes(Additions):
                 -1,
             )
             self.jump(slid, self.undetermined(slid), gone)
+
+    # Where two surfaces meet
+
+    def meets(self, pair: TracedSurface) -> bool:
+        """Return whether several ways may lead on where motion that slides comes to the surface of a pair.
+
+        Just one does where one of two relays that add up does not act on the other's rate, as with friction on masses;
+        static friction has rules of its own. There each surface is asked by itself."""
+        slid = {mode: one for one, mode in self.sliding.items()}
+        if pair.static is not None or pair.below not in slid or len(self.along[pair.below]) != 1:
+            return False
+        low, high = slid[pair.below], slid[pair.above]
+        if low.static is not None:
+            return False
+        near, far = ([self.fields[mode] for mode in (one.below, one.above)] for one in (low, high))
+        if any(sp.expand(b - a - d + c) != 0 for a, b, c, d in zip(*near, *far, strict=True)):
+            return True
+        acts = (pair, low.below, low.above), (low, low.below, high.below)
+        return all(sp.expand(self.rate(on, a) - self.rate(on, b)) != 0 for on, a, b in acts)
+
+    def add_meetings(self, surfaces: Sequence[TracedSurface], asked: Collection[tuple[int, int]]) -> None:
+        """Add the transitions from sliding along one surface at each other one, but those ``asked`` (indicator, mode).
+
+        Of the ways that may lead on, off both surfaces or along one of them, just one is taken. Where there are two, or
+        one along a surface that both fields leave, motion is not unique; where there is none it stays on both."""
+        known = {(one.indicator, one.below, one.above): one for one in surfaces}
+        behind = {(1, one.indicator, one.below): one.above for one in surfaces}
+        behind |= {(-1, one.indicator, one.above): one.below for one in surfaces}
+        left: set[tuple[int, int, Rows]] = set()
+        for pair in [one for one in surfaces if one in self.sliding]:
+            slid, sides = self.sliding[pair], (pair.below, pair.above)
+            for s, h in dict.fromkeys((s, h) for s, h, near in behind if near in sides and h != pair.indicator):
+                if (h, slid) in asked:
+                    continue
+                far = [behind.get((s, h, mode), mode) for mode in sides]
+                beyond = known.get((pair.indicator, far[0], far[1]))
+                ways: list[tuple[int | None, Rows]] = [(far[0], (self.sign(h, far[0], s),))]
+                if far[0] != far[1]:
+                    both_ways = zip(far, (-1, 1), strict=True)
+                    ways = [(end, (self.sign(h, end, s), self.sign(pair.indicator, end, i))) for end, i in both_ways]
+                ways += self.along_one(beyond, h, s)
+                for near, end, side in zip(sides, far, (-1, 1), strict=True):
+                    low, high = (near, end)[::s]
+                    ways += self.along_one(known.get((h, low, high)), pair.indicator, side)
+                at = TracedCondition(h, s), self.across(pair, h, s)[0]
+                cell, held = {*sides, *far}, {h, pair.indicator}
+                for one, two in combinations(ways, 2):
+                    either = dict.fromkeys((*one[1], *two[1]))
+                    if len({row.indicator for row in either}) == len(either):
+                        self.jump(slid, self.undetermined(slid), *at, *either)
+                for target, rows in ways:
+                    if target is not None:
+                        self.jump(slid, target, *at, *rows)
+                both = [m for m in self.sliding.values() if self.along[m] == held and self.cells[m] == cell]
+                on = self.sliding[beyond] if beyond in self.sliding else far[0]
+                self.jump(slid, both[0] if both else on, *at)
+                left |= {(both[0], target, rows) for target, rows in ways if both and target is not None}
+        for mode, target, rows in sorted(left):
+            self.jump(mode, target, *rows)
+
+    def sign(self, h: int, mode: int, s: int) -> TracedCondition:
+        """The condition that an indicator's rate in a mode, on its surface, has the sign s."""
+        pair = TracedSurface(h, mode, mode, "")
+        rate = self.at_surface(pair, self.rate(pair, mode))
+        return TracedCondition(self.indicator(rate, f"{self.indicator_names[h]} rate in {self.modes[mode]}"), s)
+
+    def across(self, pair: TracedSurface, h: int, s: int) -> tuple[TracedCondition, bool]:
+        """The condition that an indicator has a rate of the sign s where motion slides along another surface.
+
+        Where that rate has a pole it is its numerator, which is told: the denominator is positive where the surface
+        attracts."""
+        slid, (below, above) = self.sliding[pair], (pair.below, pair.above)
+        if not self.has_pole(self.rate(TracedSurface(h, slid, slid, ""), slid)):
+            return self.sign(h, slid, s), False
+        (a, b), (c, d) = (
+            [self.indicators[self.sign(of, mode, 1).indicator] for mode in (below, above)] for of in (pair.indicator, h)
+        )
+        name = f"{self.indicator_names[h]} way in {self.modes[slid]}"
+        return TracedCondition(self.indicator(a * d - b * c, name), s), True
+
+    def along_one(self, pair: TracedSurface | None, h: int, s: int) -> list[tuple[int | None, Rows]]:
+        """The way along a surface on the side s of another one, and that where both fields leave it: no target."""
+        if pair is None or pair not in self.sliding:
+            return []
+        below, above = (self.sign(pair.indicator, mode, 1) for mode in (pair.below, pair.above))
+        on, turned = self.across(pair, h, s)
+        attracts = below, above._replace(sign=-1), on
+        leaves = below._replace(sign=-1), above, on._replace(sign=-s if turned else s)
+        return [(self.sliding[pair], attracts), (None, leaves)]
+
+    def has_pole(self, expression: sp.Expr) -> bool:
+        """Return whether an expression has a moving denominator."""
+        powers = expression.atoms(sp.Pow)
+        return any(power.base.free_symbols & self.moving and not power.exp.is_nonnegative for power in powers)
+
+    def idle(self) -> Iterator[frozenset[int]]:
+        """Of each mode the derived indicators with a moving denominator that no transition of it asks for: a pole
+        beyond another mode's surface is no place at which a run of this one may end."""
+        derived = range(len(self.traced.indicators), len(self.indicators))
+        poles = {i for i in derived if self.has_pole(self.indicators[i])}
+        for mode in range(len(self.modes)):
+            yield frozenset(poles - {row.indicator for jump in self.jumps if jump.source == mode for row in jump.rows})
 
     def undetermined(self, slid: int) -> int:
         """The mode that says that motion is not unique behind the end of a sliding mode."""
@@ -308,6 +435,12 @@ class _SlidingModes(Additions):
 
 def _agree(traced: Traced, one: Field, two: Field) -> bool:
     """Return whether two vector fields are the same, by their values at fixed pseudo-random points."""
-    random, sizes = np.random.default_rng(11), ((len(traced.p),), (), (len(traced.u),), (len(traced.m),))
-    both = numeric(traced, (*one, *two))(*(random.uniform(0.5, 1.5, (SEEDS, *size)) for size in sizes))
-    return np.allclose(both[:, : len(one)], both[:, len(one) :], rtol=1e-9, atol=1e-9)
+    both = numeric(traced, (*one, *two))(*_somewhere(traced))
+    return np.allclose(both[:, : len(one)], both[:, len(one) :], rtol=AGREE, atol=AGREE)
+
+
+def _somewhere(traced: Traced, parameters: int = SEEDS) -> tuple[FloatArray, ...]:
+    """Fixed pseudo-random parameters (as many), times, states and memories."""
+    random, sizes = np.random.default_rng(11), ((), (len(traced.u),), (len(traced.m),))
+    p = random.uniform(0.5, 1.5, (parameters, len(traced.p)))
+    return p, *(random.uniform(0.5, 1.5, (SEEDS, *size)) for size in sizes)

@@ -61,6 +61,7 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
         transitions=tuple(jumps.values()),
         outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs),
         along=(),
+        idle=(),
     ), apart
 
 

@@ -76,7 +76,8 @@ class Traced:
 
     ``fields[mode][state]`` is du/dt (0 where ``lacking[mode][state]``: the mode does not have that state),
     ``indicators[i]``, ``outputs[i][mode]``. ``period`` is the forcing period in ``p`` (None: autonomous). Modes behind
-    the declared ones may keep indicators at zero: ``along[mode]``.
+    the declared ones may keep indicators at zero: ``along[mode]``. Those of ``idle[mode]`` are of other modes, and
+    may have no value in this one.
     """
 
     name: str
@@ -97,6 +98,7 @@ class Traced:
     outputs: tuple[tuple[Expr, ...], ...]
     period: Expr | None
     along: tuple[frozenset[int], ...] = ()
+    idle: tuple[frozenset[int], ...] = ()
     patterns: Patterns | None = field(default=None, repr=False)  # modes are made when they are visited
     decider: Decider | None = field(default=None, compare=False, repr=False)  # what elements decide together
 
