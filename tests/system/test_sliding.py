@@ -230,3 +230,19 @@ def test_wrong_surfaces(given: dict[str, Any], says: str) -> None:
         return
     with pytest.raises(SystemDefinitionError, match=says):
         friction(**given)
+
+
+def test_texts_leave_out_where_runs_end():
+    """Behind a two-fold motion is not unique: that mode has no equations of its own to read."""
+    system = System(
+        states=["x", "y", "z"],
+        parameters={},
+        modes={"below": lambda t, u, p: (0, 2, u.y), "above": lambda t, u, p: (1, -3, u.x)},
+        indicators={"h": lambda t, u, p: u.z},
+        transitions=[Surface("h", below="below", above="above")],
+    )
+    assert system.modes[-1] == "h_sliding_not_unique"
+    latex = system.to_latex()
+    assert "not_unique" not in str(system)
+    assert r"not\_unique" not in latex
+    assert latex.count(r"\dot{z}") == 3

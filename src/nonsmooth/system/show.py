@@ -10,6 +10,7 @@ import sympy as sp
 from nonsmooth.results.representation import html_table, text_table
 from nonsmooth.system.parameter import latex_name
 from nonsmooth.system.symbolic.expressions import write_expression
+from nonsmooth.system.symbolic.traced import NOT_UNIQUE
 from nonsmooth.system.transition import condition_text
 
 if TYPE_CHECKING:
@@ -71,6 +72,8 @@ def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
     if short and loads is not None:
         modes = tuple(loads.fields), tuple(loads.fields.values()), len(loads.fields) * (traced.lacking[0],)
     for mode, field, lacking in zip(*modes, strict=True):
+        if mode.endswith(NOT_UNIQUE):  # a run that comes there ends
+            continue
         head = "equations" if short and len(modes[0]) == 1 else f"mode {mode}"
         for name, e, gone in zip(traced.state_names, field, lacking, strict=True):
             if not gone:
@@ -131,6 +134,8 @@ def latex(system: System) -> str:
 
     lines = []
     for mode, field, lacking in zip(traced.mode_names, traced.fields, traced.lacking, strict=True):
+        if mode.endswith(NOT_UNIQUE):
+            continue
         label = rf"&& {word(mode)}"
         for symbol, e, gone in zip(traced.u, field, lacking, strict=True):
             if not gone:
@@ -140,6 +145,8 @@ def latex(system: System) -> str:
         rf"h_{{{word(name)}}} &= {write(e)}" for name, e in zip(traced.indicator_names, traced.indicators, strict=True)
     ]
     for jump in traced.transitions:
+        if traced.ends(jump):
+            continue
         arrow = rf"{word(traced.mode_names[jump.source])} &\to {word(traced.mode_names[jump.target])}"
         if jump.at is not None:
             condition = "t / T = " + (f"{jump.at:g}" if isinstance(jump.at, int | float) else write(jump.at))

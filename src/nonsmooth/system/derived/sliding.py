@@ -343,7 +343,7 @@ class _SlidingModes(Additions):
                 both = [m for m in self.sliding.values() if self.along[m] == held and self.cells[m] == cell]
                 on = self.sliding[beyond] if beyond in self.sliding else far[0]
                 self.jump(slid, both[0] if both else on, *at)
-                left |= {(both[0], target, rows) for target, rows in ways if both and target is not None}
+                left |= {(both[0], target, (*sorted(rows),)) for target, rows in ways if both and target is not None}
         for mode, target, rows in sorted(left):
             self.jump(mode, target, *rows)
 
