@@ -334,11 +334,11 @@ class _SlidingModes(Additions):
                 at = TracedCondition(h, s), self.across(pair, h, s)[0]
                 cell, held = {*sides, *far}, {h, pair.indicator}
                 for one, two in combinations(ways, 2):
-                    either = dict.fromkeys((*one[1], *two[1]))
-                    if len({row.indicator for row in either}) == len(either):
+                    either = (*dict.fromkeys((*one[1], *two[1])),)
+                    if self.possible(either):
                         self.jump(slid, self.undetermined(slid), *at, *either)
                 for target, rows in ways:
-                    if target is not None:
+                    if target is not None and self.possible(rows):
                         self.jump(slid, target, *at, *rows)
                 both = [m for m in self.sliding.values() if self.along[m] == held and self.cells[m] == cell]
                 on = self.sliding[beyond] if beyond in self.sliding else far[0]
@@ -346,6 +346,11 @@ class _SlidingModes(Additions):
                 left |= {(both[0], target, (*sorted(rows),)) for target, rows in ways if both and target is not None}
         for mode, target, rows in sorted(left):
             self.jump(mode, target, *rows)
+
+    def possible(self, rows: Rows) -> bool:
+        """Return whether conditions may hold together: not opposite ones, nor signs that a number excludes."""
+        up, down = ({self.indicators[row.indicator] for row in rows if row.sign == s} for s in (1, -1))
+        return not any((more := low - high).is_number and more >= 0 for high in up for low in down)
 
     def sign(self, h: int, mode: int, s: int) -> TracedCondition:
         """The condition that an indicator's rate in a mode, on its surface, has the sign s."""
