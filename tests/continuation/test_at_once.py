@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from brute_force import misses
 from test_random_branches import endings
 
@@ -104,10 +106,9 @@ def test_an_impact_in_two_steps_is_that_in_one() -> None:
     assert found["grazing"].values[0] == known["grazing"].values[0] == "non_smooth_fold"
 
 
-def test_transitions_of_one_instant_pass_the_section_together() -> None:
-    """An impact behind which friction turns at once meets the section as w is varied: the round begins behind both.
-
-    The orbits are those of simulations, through both ends of the range."""
+@cache
+def rubbed_and_stopped() -> tuple[ns.System, xr.Dataset]:
+    """An impact behind which friction turns at once; its branch over the frequency, from the middle."""
     system = ns.mechanical(
         1.0,
         0.1,
@@ -119,6 +120,23 @@ def test_transitions_of_one_instant_pass_the_section_together() -> None:
             "stop": ns.elements.Stop(at="q", position=0.5, restitution=0.5),
         },
     )
-    branch = ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (0.64, 1.0))
+    return system, ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (0.64, 1.0))
+
+
+def test_transitions_of_one_instant_pass_the_section_together() -> None:
+    """The impact meets the section as w is varied: the round begins behind both.
+
+    The orbits are those of simulations, through both ends of the range."""
+    system, branch = rubbed_and_stopped()
     assert endings(branch) == ["range", "range"]
     assert misses(system, branch, "w") < 1e-9
+
+
+def test_a_boundary_is_named_alike_from_either_side() -> None:
+    """A mass that comes to zero speed under a load equal to the friction sticks at once or slides on a little; it
+    arrives with an acceleration, and no motion is tangent to anything."""
+    system, branch = rubbed_and_stopped()
+    begun = ns.find_orbit(system.with_parameters(w=0.643), transient=300, progress=False)
+    right, left = (ns.special_points(one) for one in (branch, ns.continue_orbit(begun, "w", (0.64, 0.68))))
+    assert left["kind"].values.tolist() == right["kind"].values[:1].tolist() == ["corner"]
+    assert left["w"].values == pytest.approx(right["w"].values[:1], abs=1e-10)

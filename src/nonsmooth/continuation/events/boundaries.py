@@ -21,7 +21,6 @@ from nonsmooth.continuation.march.event import Event, Met, Step, first_beyond, l
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.path import NOTHING
 from nonsmooth.continuation.problems.shooting import ON
-from nonsmooth.continuation.problems.visits import led
 
 ENDS = 1e-4  # of the period: a maximum as near to a crossing belongs to it
 NO_SPEED = 1e-3  # of the steepest crossing: slower than this is a touch
@@ -75,20 +74,6 @@ class Boundary(Event):
 
         ``beyond`` is the curve on which the branch goes on."""
 
-    def instant(self, point: Any) -> tuple[int, float, Any] | None:
-        """Mode, time and state where it is reached; None where no margin tells."""
-        return None
-
-    def touches(self, point: Any, indicator: int) -> bool:
-        """Return whether motion is tangent to a surface where it is reached: a graze, whatever else happens there.
-
-        Where it is not known when, that is what the boundary looks for."""
-        at = self.instant(point)
-        if at is None or indicator < 0:
-            return self.name == "grazing"
-        seen = point.shooting.flow.indicator(point.values, indicator, *at)
-        return abs(seen.L) < NO_SPEED * float(np.abs(seen.L_z) @ point.curve.size)
-
 
 class Crossed(Boundary):
     """A margin of a crossing, or of a visit that begins or ends with one: its row nearest to zero tells the surface."""
@@ -112,11 +97,6 @@ class Crossed(Boundary):
                 size = max(float(np.abs(one.h_z) @ point.curve.size), 1e-300)
                 near.append((max(abs(one.h) / size, ON), len(near), row.indicator))
         return min((one for one in near if one[-1] != fires), default=(0.0, -1, -1))[-1]
-
-    def instant(self, point: Any) -> tuple[int, float, Any]:
-        """In the visit that ends there (a reset that leads there: that begins)."""
-        visit = self.visit(point)
-        return point.signature.visits[visit].mode, *self.crossing(point, visit)[1:3]
 
 
 def _end(point: Any, visit: int) -> tuple[float, Any]:
@@ -205,12 +185,6 @@ class Grazing(Boundary):
         (visit, k), times = point.path.touched, point.solved.times
         ends = np.abs(times[visit : visit + 2] - point.path.place[visit, k])
         return float(ends.min()) >= ENDS * float(times[-1])
-
-    def instant(self, point: Any) -> tuple[int, float, Any]:
-        """In the visit that touches it."""
-        (visit, k), once = point.path.touched, point.once
-        mode, t, begin = once.signature.visits[visit].mode, float(point.path.place[visit, k]), point.solved.times[visit]
-        return mode, t, led(point.shooting.flow, point.values, mode, float(begin), t - float(begin), once.states[visit])
 
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator that is touched."""

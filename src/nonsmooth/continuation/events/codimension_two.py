@@ -123,8 +123,7 @@ class AlongCurve(Policy):
         """Go on behind the section; at a graze or a corner, which is recorded, the curve ends."""
         if (after := section_passed(met)) is not None:
             return after
-        first = met[0]
-        grazes = contacts_of(met) or first.kind.touches(first.point, first.kind.surface(first.point))
+        grazes = contacts_of(met) or met[0].kind.name == "grazing"
         found.ending = "grazing" if grazes else "corner"
         found.mark(self._graze if grazes else found.ending, met[0].point)
         return None

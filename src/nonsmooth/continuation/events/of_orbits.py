@@ -314,7 +314,7 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, end: Met | Non
     kind, point = sides[0].kind, sides[0].point
     own = [change.indicator for side in sides for change in side.kind.contacts(side.point)]
     indicator = own[0] if own else kind.surface(point, beyond)
-    touches = sliding in TOUCHES if sliding else own or kind.touches(point, indicator)
+    touches = sliding in TOUCHES if sliding else own or kind.name == "grazing"
     name = name or ("grazing" if touches else "corner")
     if name == "grazing":  # the orbit without the contact
         point = min((side.point for side in sides), key=lambda one: one.shooting.m)
