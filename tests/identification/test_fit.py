@@ -515,17 +515,18 @@ def test_a_simulated_run_has_no_readings_at_its_crossings() -> None:
     )
     run = ns.simulate(system, periods=1.5, samples=120, start={"q": 0.1, "v_q": 0.2})
     assert len(run["crossing_time"]) > 3
-    for one in (run, run[["u"]]):
+    for one in (run, run[["u"]], ns.table(run), run["u"].to_pandas()):
         found = ns.fit(system.with_parameters(k=8.16), one, ["k"], measured=["q", "v_q"], progress=False)
         assert found["k"] == pytest.approx(8.0, abs=1e-9)
 
 
 def test_a_dataset_whose_times_repeat_is_answered_as_any_other_record() -> None:
-    """Of times that were written with too few digits each stands twice; only a simulated run has crossings there."""
+    """Of times that were written with too few digits each stands twice, or some do; crossings lie between samples."""
     import xarray as xr
 
-    t = np.round(np.arange(0, 8, 0.05) + 1e-9, 1)
-    data = xr.Dataset({"x": ("time", closed_form(np.arange(0, 8, 0.05)))}, {"time": t})
-    for record in (data, data.to_dataframe()):
-        with pytest.raises(ValueError, match="time must increase from sample to sample; sample .* is at 0.1 after 0.1"):
-            ns.fit(free(), record, ["k"], progress=False)
+    for step, where in ((0.05, "0.1 after 0.1"), (0.09, "0.5 after 0.5")):
+        t = np.arange(0, 8, step)
+        data = xr.Dataset({"x": ("time", closed_form(t))}, {"time": np.round(t + 1e-9, 1)})
+        for record in (data, data.to_dataframe()):
+            with pytest.raises(ValueError, match=f"time must increase from sample to sample; sample .* is at {where}"):
+                ns.fit(free(), record, ["k"], progress=False)

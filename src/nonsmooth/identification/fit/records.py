@@ -178,7 +178,8 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
     if hasattr(one, "columns") and hasattr(one, "index") and time not in one:
         one = one.rename_axis(index=time).reset_index()
     if hasattr(one, "items") and time in one:
-        return {"run": {str(k): _pair(one[time], y, str(k)) for k, y in one.items() if k != time}}
+        numbers = {k: y for k, y in one.items() if k != time and not isinstance(next(iter(np.ravel(y)), 0.0), str)}
+        return {"run": {str(k): _between_ticks(*_pair(one[time], y, str(k))) for k, y in numbers.items()}}
     if isinstance(one, Mapping):
         made = {}
         for name, pair in one.items():
@@ -187,7 +188,7 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
                     f"channel {name!r} must be a pair (t, y), not {shortened(pair)}; or give the instants of all "
                     f"channels once, under {time!r}"
                 )
-            made[str(name)] = _pair(pair[0], pair[1], str(name))
+            made[str(name)] = _between_ticks(*_pair(pair[0], pair[1], str(name)))
         return {"run": made}
     of_a_file = "; read a file with ns.load_recording" if isinstance(one, str | PathLike) else ""
     raise TypeError(f"a recording is {FORMS}, not {shortened(one)}{of_a_file}")
@@ -221,6 +222,17 @@ def _pair(t: Any, y: Any, name: str) -> tuple[FloatArray, FloatArray]:
             f"{both[0].shape}"
         )
     return both
+
+
+def _between_ticks(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A channel without both limits of jumps, as a run of ``simulate`` has them in a table too: an instant that stands
+    twice within one step of the clock. Of a clock with too few digits it stands within two."""
+    step = np.diff(t, prepend=-np.inf, append=np.inf)
+    twice = np.flatnonzero(step[1:-1] == 0)
+    twice = twice[step[twice] + step[twice + 2] < 1.5 * np.median(step[step > 0])]
+    kept = np.ones(len(t), dtype=bool)
+    kept[twice], kept[twice + 1] = False, False
+    return t[kept], y[kept]
 
 
 def _settings(system: System, settings: Any, labels: list[str]) -> dict[str, dict[str, float]]:
