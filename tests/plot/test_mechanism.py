@@ -89,7 +89,7 @@ def test_a_chain_is_read_as_it_was_built(chain) -> None:
     assert rubs == {(GROUND, 0, r"\mu", ""), (GROUND, 1, r"\mu", "v_{b}")}
     (play,) = [one for one in scheme.links if one.kind == "backlash"]
     assert (play.left, play.right, play.label, play.words, play.half) == (1, 2, "k_{s}", "b", 0.2)
-    assert scheme.forces == {0: r"F \cos{\left(w t \right)}"}
+    assert scheme.forces == {0: r"F\,\cos{\left(w\,t \right)}"}
 
 
 def test_masses_of_numbers_and_springs_beyond_the_next_mass() -> None:
@@ -258,11 +258,28 @@ def test_laws_are_written_as_they_are_and_what_none_gives_by_its_value() -> None
         (one.kind, one.label, one.damped) for one in scheme_of(system).links if one.kind not in ("spring", "damper")
     }
     assert found == {
-        ("elastic", "2 k", False),
+        ("elastic", r"2\,k", False),
         ("elastic", "k", True),
         ("friction", "f(v)", False),
         ("stop", "e = 0", False),
     }
+
+
+def test_factors_are_apart_as_they_are_drawn() -> None:
+    """Names of several letters do not run into each other: the width of a label is measured, not its text."""
+    import matplotlib.pyplot as plt
+
+    belt = E.Coulomb(at="q", friction=0.2, belt=lambda t, u, p: p.vb * np.cos(p.w * t))
+    system = ns.mechanical(1, 0.1, 1, parameters={"vb": 0.3, "w": 1.2}, elements={"rub": belt})
+    label = str(scheme_of(system).links[-1].words)
+    name, space, rest = label.partition(r"\,")
+    assert (name, space, rest[:4]) == (r"\mathrm{vb}", r"\,", r"\cos")
+    figure = plt.figure()
+    whole, alone = (
+        figure.text(0, 0, f"${words}$").get_window_extent().width for words in (label, rf"\mathrm{{vb}}{rest}")
+    )
+    assert whole > alone + 1.0
+    plt.close(figure)
 
 
 def test_a_law_that_is_longer_than_its_gap_is_not_written() -> None:

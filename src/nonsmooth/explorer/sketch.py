@@ -37,7 +37,7 @@ def _short(part: Any) -> Any:
 def _plain(latex: str) -> str:
     """A label in plain text; nothing of a formula that needs more than a line."""
     text = re.sub(r"(\\?[A-Za-z]+)_\{([^{}]*)\}", lambda found: plain_of(found[0]), latex.strip("$"))
-    text = re.sub(r"\\[A-Za-z]+", lambda found: plain_of(found[0]), text.replace(r"\pm", "±"))
+    text = re.sub(r"\\[A-Za-z]+", lambda found: plain_of(found[0]), text.replace(r"\pm", "±").replace(r"\,", " "))
     return "" if re.search(r"[\\{}]|frac|left", text) else text.replace("-", "\N{MINUS SIGN}")
 
 

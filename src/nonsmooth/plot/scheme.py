@@ -105,9 +105,9 @@ class _SchemeReader:
             return f"{float(e):.4g}"
         four = {n: float(f"{float(n):.4g}") for n in e.atoms(sp.Float)}
         short = {n: sp.Integer(int(v)) if v == int(v) else sp.Float(v, 4) for n, v in four.items()}
-        found = str(sp.latex(e.xreplace(short), symbol_names=self.symbols, fold_short_frac=True))
+        found = str(sp.latex(e.xreplace(short), symbol_names=self.symbols, fold_short_frac=True, mul_symbol=r"\,"))
         seen = re.sub(r"\\[a-zA-Z]+", "x", re.sub(r"\\(left|right|mathrm|frac|(?=cos|sin))", "", found))
-        return found if len(re.sub(r"[{}_^ ]", "", seen)) <= _LONGEST else ""
+        return found if len(re.sub(r"[{}_^ ]|\\,", "", seen)) <= _LONGEST else ""
 
     def is_zero(self, *terms: Any) -> bool:
         """Return whether a sum of terms is zero within rounding."""
