@@ -209,11 +209,9 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
                             else:
                                 hi = c
                         v, _, row = margin(C, order, n, net, k, lo, -1)
-                        # A visit, however short, may begin where the margin and its slope are zero: rounding is no
-                        # maximum, of whichever row.
-                        size = size_of(C, order, n + rows[row, 0], reach)
+                        # A visit may begin where the margin and its slope are zero: rounding is no maximum.
                         zero = steps == 1 and a == 0.0 and fabs(begun) <= ROUNDING * begin_size[leg, k]
-                        begins = zero and (lo <= BEGUN * reach or fabs(v) <= ROUNDING * size)
+                        begins = zero and lo <= BEGUN * reach
                         if not begins and v > inner[leg, k]:
                             inner[leg, k], place[leg, k], which[leg, k] = v, t + lo, row
                     a, rising = b, s
