@@ -86,14 +86,17 @@ def of_source(path: Path, words_too: bool = True) -> Iterator[str]:
 
 
 def classes(paths: Iterable[Path]) -> Iterator[str]:
-    """The complaints about classes of the same name."""
+    """The complaints about classes, and types with a name, of the same name."""
     places: dict[str, str] = {}
     for path in paths:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ClassDef):
+            name = node.name if isinstance(node, ast.ClassDef) else ""
+            if isinstance(node, ast.AnnAssign) and "TypeAlias" in ast.unparse(node.annotation):
+                name = ast.unparse(node.target)
+            if name:
                 place = f"{path.relative_to(ROOT)}:{node.lineno}"
-                if (other := places.setdefault(node.name, place)) != place:
-                    yield f"{place}: the class {node.name} is defined at {other} too: a class name means one thing"
+                if (other := places.setdefault(name, place)) != place:
+                    yield f"{place}: the class {name} is defined at {other} too: a class name means one thing"
 
 
 def unmerged(text: str) -> bool:

@@ -42,6 +42,8 @@ def test_a_class_name_that_is_defined_twice_is_named_with_both_files(
     second.write_text("class Rows: ...\n\n\ndef f():\n    class _Cell: ...\n")
     assert [one.split(":")[:2] for one in prose.classes([first, second])] == [["b.py", "5"]]
     assert "_Cell is defined at a.py:2 too" in next(prose.classes([first, second]))
+    second.write_text('Rows: TypeAlias = "list[Row]"\nRow: TypeAlias = "dict[str, int]"\n')
+    assert [one.split(":")[:2] for one in prose.classes([first, second])] == [["b.py", "2"]]
 
 
 def test_both_sides_of_a_merge_are_named() -> None:

@@ -39,11 +39,11 @@ _RECORDED = {
 }
 
 #: Measured motions and the settings that belong to them, by key.
-Motions: TypeAlias = "dict[str, tuple[xr.Dataset, dict[str, Any]]]"
+MeasuredMotions: TypeAlias = "dict[str, tuple[xr.Dataset, dict[str, Any]]]"
 
 
 @lru_cache(maxsize=8)
-def motions(bench: Laboratory, number: int) -> Motions:
+def motions(bench: Laboratory, number: int) -> MeasuredMotions:
     """Record what stands behind a figure and measure each run: the motion and its settings by ``<value>``.
 
     The runs follow the values, in turn; where they are gone through again, from other starts, the keys are
@@ -60,7 +60,7 @@ def motions(bench: Laboratory, number: int) -> Motions:
     return found
 
 
-def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, Any]]:
+def diagram_of(found: MeasuredMotions, parameter: str) -> tuple[xr.Dataset, dict[str, Any]]:
     """Section points of motions at several values of a parameter, as ``compare`` takes a diagram; settings."""
     measured, settings = zip(*found.values(), strict=True)
     values = [_value(one, parameter) for one in settings]
@@ -73,7 +73,7 @@ def _value(settings: Mapping[str, Any], name: str) -> float:
     return np.atleast_1d(settings[name])[0]
 
 
-def runs_of(found: Motions, parameter: str) -> xr.Dataset:
+def runs_of(found: MeasuredMotions, parameter: str) -> xr.Dataset:
     """Of each motion, at rising values of the parameter: its ``setting`` and measured ``value``, ``period_number``,
     ``contact`` (0 or 1); ``run`` is its key."""
     sections, _ = diagram_of(found, parameter)
