@@ -25,6 +25,21 @@ def test_header_with_units_and_comments() -> None:
     assert any("'force': 1 blank fields dropped" in w for w in recording.warnings)
 
 
+def test_bars_between_fields_and_exponents_of_fortran() -> None:
+    """Also with a decimal comma, and with a frame of bars as databases print tables."""
+    for text in (
+        "t (s)|x (m)\n0|1.5D+00\n1|-2.5d-01\n2|3.0E+1\n",
+        "| t (s) | x (m) |\n| 0 | 1,5D+00 |\n| 1 | -2,5d-01 |\n| 2 | 3,0E+1 |\n",
+        "t (s)  x (m)\n0.D0  1.5D0\n1.D0  -.25D0\n2.D0  3.0D1\n".replace(" (", "("),
+    ):
+        x = parse_recording(text.encode(), "x.txt").channel("x")
+        assert (x.values.tolist(), x["time"].values.tolist()) == ([1.5, -0.25, 30.0], [0, 1, 2])
+    with pytest.raises(DataFileError, match="holds '1.5F\\+00', expected a number"):
+        parse_recording(b"t (s)|x (m)\n0|1.5D+00\n1|1.5F+00\n", "x.txt")
+    with pytest.raises(DataFileError, match="give header=2"):
+        parse_recording(b"a session|of today\nt|x\n0|1\n1|2\n", "x.txt")
+
+
 def test_a_number_that_marks_a_missing_value_is_missing() -> None:
     table = b"t (s), x (m)\n0, 1\n1, -999\n2, 3\n"
     for na in (("-999",), ["-999", "9999"]):

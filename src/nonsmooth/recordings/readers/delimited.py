@@ -135,7 +135,7 @@ def _advice(head: list[str]) -> str:
     """Options that would fit a table whose numbers begin further down."""
 
     def fields(text: str) -> list[str]:
-        return [field.strip().strip('"') for field in re.split(r"[\t;,]|\s+", text.strip())]
+        return [field.strip().strip('"') for field in re.split(r"[\t;,|]|\s+", text.strip())]
 
     def numeric(text: str) -> bool:
         found, some = fields(text), Numerals().some

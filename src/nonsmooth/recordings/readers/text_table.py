@@ -50,7 +50,7 @@ def decoded(data: bytes, reading: Reading) -> io.TextIOWrapper:
 def sniffed(line: str) -> str:
     """The character between the fields of a line, " " where it holds none."""
     outside = "".join(line.split('"')[::2])
-    return next((d for d in ("\t", ";", ",") if d in outside), " ")
+    return next((d for d in "\t;,|" if d in outside), " ")
 
 
 def rows(lines: Iterable[str], delimiter: str, reading: Reading, first_line: int = 1) -> Iterator[Row]:
@@ -79,7 +79,7 @@ def checked_header(fields: list[str], line: int, reading: Reading) -> list[str]:
 
 
 def number(field: str, decimal: str, thousands: str | None = None) -> float | None:
-    """The number in a field, strictly; None if it is none. Underscores and foreign digits are none."""
+    """The number in a field, strictly; None if it is none. Underscores and foreign digits are none; 1.5D+00 is 1.5."""
     text = field.strip()
     if thousands and thousands in text:
         if not re.fullmatch(rf"[+-]?\d{{1,3}}(?:{re.escape(thousands)}\d{{3}})+(?:\D.*)?", text):
@@ -92,7 +92,7 @@ def number(field: str, decimal: str, thousands: str | None = None) -> float | No
             return None
         text = text.replace(",", ".")
     try:
-        return float(text)
+        return float(text.replace("D", "E").replace("d", "e"))
     except ValueError:
         return None
 
