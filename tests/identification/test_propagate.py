@@ -191,6 +191,17 @@ def test_the_probability_of_a_period_is_that_of_the_side_of_a_flip() -> None:
     assert np.all(plane["period_number_probability"].sum("period_value").values == pytest.approx(1.0))
 
 
+def test_a_draw_without_a_motion_has_no_period_number() -> None:
+    """With damping c a linear motion has period 1, and with c < 0 it grows: neither is one without a period."""
+    s = ns.mechanical(1.0, "c", 1.0, parameters={"c": 0.3, "w": 2.0}, forcing={"q": lambda t, p: np.cos(p.w * t)})
+    band = ns.propagate({}, ns.sweep, s, "w", [1.5, 2.0], settings={"c": (0.3, 0.4)}, draws=11, seed=1, **QUIET)
+    c = band["drawn_c"].values
+    assert np.abs(c).min() > 0.02 and 0 < np.mean(c < 0) < 1
+    assert band["period_value"].values.tolist() == [1]
+    for name in ("period_number_probability", "period_number_share", "maximum_share"):
+        assert np.unique(band[name]) == pytest.approx([np.mean(c > 0)]), name
+
+
 def test_of_a_diagram_of_branches_the_special_points_have_distributions() -> None:
     s = support().with_parameters(g=-0.0045, rho=0.42)
     found = known(s, {"k": 0.004})

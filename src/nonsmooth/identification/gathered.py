@@ -12,6 +12,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.attractors.basins_matching import CLOSE
 from nonsmooth.identification.compare.draws import drawn_variables, quantiles
 from nonsmooth.identification.compare.response import nearest_alike
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
 
@@ -23,6 +24,7 @@ LISTS = {
 FINER = 8  # points to a step of a drawn branch, on a cubic
 MOST = 10**8  # numbers kept over all draws
 FAILURES = 3  # reasons that are repeated
+MOVES = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)  # a motion, with a period number or without
 
 
 class Gathered:
@@ -48,6 +50,8 @@ class Gathered:
         result = _same_attractors(self.centre, result, self.plain)
         there = {name: _at_same(self.centre[name], result[name]) for name in self.plain if name in result}
         row = {name: array.values for name, array in there.items() if array.shape == self.centre[name].shape}
+        if "period_number" in row and "status" in result and result["status"].shape == row["period_number"].shape:
+            row["period_number"] = np.where(np.isin(result["status"], MOVES), row["period_number"], np.nan)
         if self.along:
             row |= _along_sheets(self.centre, result, self.branch, self.along)
         row |= {dim: matched(self.centre, result, dim) for dim in self.lists}
@@ -97,7 +101,7 @@ class Gathered:
             every = np.append(stack, array.values)
             numbers = np.unique(every[np.isfinite(every)]).astype(array.dtype)
             shares = np.stack([np.mean(stack == number, axis=0) for number in numbers])
-            return {
+            return self._share(name, stack) | {
                 "period_number_probability": labelled(
                     ("period_value", *array.dims), shares, "share of draws with this period number (0: none found)"
                 ),
@@ -109,10 +113,13 @@ class Gathered:
         array = self.centre[name]
         attrs = {key: value for key, value in array.attrs.items() if isinstance(value, str)}
         found = {f"{name}_quantiles": (("quantile", *array.dims), quantiles(stack, edges), attrs)}
+        return found | self._share(name, stack)
+
+    def _share(self, name: str, stack: FloatArray) -> dict[str, Any]:
         share = np.isfinite(stack).sum(axis=0) / len(self.rows)
-        if (share < 1).any():
-            found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")
-        return found
+        if not (share < 1).any():
+            return {}
+        return {f"{name}_share": labelled(self.centre[name].dims, share, f"share of draws that have {name} here")}
 
 
 def _same_attractors(centre: xr.Dataset, result: xr.Dataset, names: list[str]) -> xr.Dataset:

@@ -105,6 +105,15 @@ def test_the_band_is_the_spread_of_the_prediction() -> None:
     xr.testing.assert_identical(found, again)
 
 
+def test_noise_of_the_recording_leaves_the_true_motion_inside_the_band() -> None:
+    """The band of parameters that are known well has no width; two standard errors of the mean hold 95 % of it."""
+    free = {"rho": 0.14, "omega": 6.5, "g": 1.0}
+    motion = record(MODEL.with_parameters(free), 30.0)
+    for k, least, most in ((8.47, 0.9, 1.0), (8.8, 0.0, 0.5)):
+        found = compare(motion, MODEL, settings={**free, "k": (k, 1e-9)}, draws=5, grid=64)
+        assert ((least <= found["inside_band"]) & (found["inside_band"] <= most)).all()
+
+
 def test_a_setting_that_follows_from_a_parameter_is_uncertain_with_it() -> None:
     settings = {"rho": lambda p: p["k"] * 0.0165, "omega": 4.0, "g": 1.0}
     motion = record(MODEL.with_parameters(rho=8.47 * 0.0165, omega=4.0, g=1.0), 30.0)

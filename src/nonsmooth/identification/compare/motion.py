@@ -66,8 +66,11 @@ def compare_motion(
     if model.system is not None and model.draws:
         assert predicted.attractor is not None  # a System's prediction has one
         systems, drawn = model.drawn()
-        both = ("measured_orbit", "theory_orbit")
-        closed = tuple(variables[key][1] for key in both) if "phase" in variables else None
+        closed = None
+        if "phase" in variables and folded is not None:
+            scatter = np.fmax(variables["measured_scatter"][1], noise)
+            error = scatter / np.sqrt(max(len(folded) // number, 1))
+            closed = variables["measured_orbit"][1], variables["theory_orbit"][1], error
         variables |= motion_band(systems, model, predicted.attractor, sections, phases, scale, closed)
         variables |= drawn
     named = {"long_name": "phase of the section", "units": "forcing periods"}
@@ -230,11 +233,12 @@ def motion_band(
     sections: list[FloatArray],
     phases: list[float],
     scale: FloatArray,
-    closed: tuple[FloatArray, FloatArray] | None,
+    closed: tuple[FloatArray, FloatArray, FloatArray] | None,
 ) -> dict[str, Any]:
     """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
 
-    ``closed``: measured and predicted orbit (periods * grid, states), where both motions are periodic. A draw with
+    ``closed``: measured and predicted orbit (periods * grid, states), where both motions are periodic, and the standard
+    error of the measured one. A draw with
     another period number has another motion, not a point of the band: ``band_share`` says how many kept theirs.
     """
     rng = np.random.default_rng(model.seed)
@@ -275,6 +279,9 @@ def motion_band(
         band = model.band(orbits)
         for word, values in band.items():
             variables[f"theory_{word}"] = labelled(("phase", "state"), values, f"{word} of the band")
-        inside = ((closed[0] >= band["low"]) & (closed[0] <= band["high"])).mean(axis=0)
-        variables["inside_band"] = labelled("state", inside, "share of the measured orbit that lies inside the band")
+        reach = 2 * closed[2]
+        inside = ((closed[0] + reach >= band["low"]) & (closed[0] - reach <= band["high"])).mean(axis=0)
+        variables["inside_band"] = labelled(
+            "state", inside, "share of the measured orbit within two standard errors of the band"
+        )
     return variables
