@@ -245,3 +245,18 @@ def test_a_branch_stands_once_though_its_ends_are_rounded(low: float) -> None:
     )
     found = ns.bifurcation_diagram(affine, "a", (low, 0.6), n=5, depth=0)
     assert found["period_number"].values.tolist() == [1]
+
+
+def test_a_branch_of_a_doubled_motion_has_both_section_points() -> None:
+    """By simulation; a part of the branch that is taken on has them too."""
+    system = support(omega=11.15, rho=0.33, g=-0.001)
+    single = ns.continue_orbit(ns.find_orbit(system), "g", (-0.0015, 0.001))
+    assert single["returns"].sizes["return"] == 1
+    flips = ns.special_points(single)
+    doubled = ns.continue_orbit(flips.isel(special=int(np.flatnonzero(flips["kind"] == "flip")[0])))
+    assert doubled["returns"].sizes["return"] == 2 == int(doubled["period_number"])
+    for point in (doubled.isel(point=i) for i in (3, 9)):
+        run = ns.poincare(system.with_parameters(g=float(point["g"])), n=2, start=point["section"].values)
+        assert run["section"].values == pytest.approx(np.roll(point["returns"].values, -1, axis=0), abs=1e-9)
+    again = ns.continue_orbit(doubled.isel(point=slice(None, 10)), range=(-0.0015, 0.001))
+    assert again["returns"].values[:5] == pytest.approx(doubled["returns"].values[:5], abs=1e-9)

@@ -10,10 +10,9 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.arguments import LargestStep, limits
 from nonsmooth.continuation.branches.other_branches import SWITCHES
-from nonsmooth.continuation.branches.reading import read_branch, renumbered
+from nonsmooth.continuation.branches.reading import renumbered
 from nonsmooth.continuation.continue_orbit import continue_orbit
 from nonsmooth.continuation.find import find_orbit
-from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.searches.search import Search, search_within
 from nonsmooth.continuation.special import special_points
 from nonsmooth.errors import SolveError
@@ -66,7 +65,7 @@ class _Branch:
 
 
 def _branch(data: xr.Dataset, parent: int, level: int) -> _Branch:
-    return _Branch(data, parent, level, data[data.attrs["parameter"]].values, returns_of(data))
+    return _Branch(data, parent, level, data[data.attrs["parameter"]].values, data["returns"].values)
 
 
 @checked
@@ -117,11 +116,10 @@ def bifurcation_diagram(
     Returns
     -------
     xarray.Dataset
-        Over ``point``, branch after branch: ``branch`` and all that :func:`continue_orbit` gives, ``returns`` (all
-        section points of an orbit); over ``special`` the special points, with ``special_branch``
-        (:func:`special_points` makes a table of them); over ``branch``: ``period_number``, ``parent`` (the branch it
-        leaves, -1: found in a sweep), ``ended`` and ``ended_because``. Of the sweeps: ``swept_value``,
-        ``swept_section``, ``swept_period_number``.
+        Over ``point``, branch after branch: ``branch`` and all that :func:`continue_orbit` gives; over ``special`` the
+        special points, with ``special_branch`` (:func:`special_points` makes a table of them); over ``branch``:
+        ``period_number``, ``parent`` (the branch it leaves, -1: found in a sweep), ``ended`` and ``ended_because``. Of
+        the sweeps: ``swept_value``, ``swept_section``, ``swept_period_number``.
 
     Raises
     ------
@@ -221,30 +219,6 @@ def _switched(found: list[_Branch], depth: int, most: int, search: Search, more:
     return True
 
 
-def returns_of(branch: xr.Dataset) -> FloatArray:
-    """All section points (point, period number, state) of a branch's orbits, from their unknowns."""
-    system, record = read_branch(branch)
-    p, n = max(record.period_number, 1), len(system.states)
-    found = np.empty((len(record.points), p, n))
-    shootings: dict[Any, Shooting] = {}
-    for i, point in enumerate(record.points):
-        found[i] = point.section
-        if p == 1:
-            continue
-        if point.signature not in shootings:
-            shootings[point.signature] = Shooting(system, point.signature, p, (record.parameter,))
-        shooting = shootings[point.signature]
-        times, states = shooting.split(point.X)
-        values = shooting.parameters(point.X)
-        at = np.arange(1, p) * (point.period / p)
-        begins = np.concatenate([[0.0], times])
-        # The visit behind a transition that lies on the section itself.
-        visit = np.searchsorted(begins, at + 1e-12 * point.period, side="right") - 1
-        there = shooting.flow.segments(values, shooting.modes[visit], begins[visit], at - begins[visit], states[visit])
-        found[i, 1:] = there.z[:, :n]
-    return found
-
-
 def _dataset(
     system: System, name: str, found: list[_Branch], swept: xr.Dataset, options: dict[str, Any], complete: bool
 ) -> xr.Dataset:
@@ -252,8 +226,7 @@ def _dataset(
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
-    parts = ((renumbered(one.data, system), one.returns, one.parent) for one in found)
-    branches, returns, parents = zip(*parts, strict=True)
+    branches, parents = zip(*((renumbered(one.data, system), one.parent) for one in found), strict=True)
     labels = labels_of(system)  # with the modes of all branches
     attrs = dict(provenance(labels, "bifurcation_diagram", options, method="multiple shooting"))
-    return diagram(labels, attrs, name, branches, returns, parents, swept, complete)
+    return diagram(labels, attrs, name, branches, parents, swept, complete)

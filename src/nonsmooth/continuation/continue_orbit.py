@@ -59,8 +59,9 @@ def continue_orbit(
     -------
     xarray.Dataset
         Over ``point``, in order along the branch: the parameter, ``section``, ``maximum``, ``minimum``, ``period``,
-        ``floquet_multipliers``, ``stable``, ``signature``, ``clearance``; over ``special`` the special points (see
-        :func:`special_points`); over ``end`` how the branch ends: ``ended`` and, in a sentence, ``ended_because``.
+        ``floquet_multipliers``, ``stable``, ``signature``, ``clearance``, and over ``return`` too ``returns``, all
+        section points of the orbit; over ``special`` the special points (see :func:`special_points`); over ``end`` how
+        the branch ends: ``ended`` and, in a sentence, ``ended_because``.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels, flag_attributes
 from nonsmooth.results.provenance import with_short_record
@@ -157,7 +157,6 @@ def _array(column: Column, values: list[Any], sizes: dict[str, int]) -> Any:
 
 _BRANCHES = table(
     ("branch", "point", "own", "branch"),
-    ("returns", "point return state", "own", "section points"),
     ("special_branch", "special", "own", "branch of the special point"),
     ("special_period_number", "special", "own", "period number of the special point's orbit"),
     ("period_number", "branch_id", "place", "period number"),
@@ -173,24 +172,19 @@ def diagram(
     attrs: Mapping[str, Any],
     parameter: str,
     branches: Sequence[xr.Dataset],
-    returns: Sequence[NDArray[np.float64]],
     parents: Sequence[int],
     swept: xr.Dataset,
     complete: bool,
 ) -> xr.Dataset:
     """The result of ``bifurcation_diagram``: branches one after the other over ``point``, and the sweeps.
 
-    ``returns`` (point, period number, state): all section points of each branch; ``parents`` the branches they leave.
-    """
+    ``parents`` are the branches that they leave."""
     # Words of the branches, each once, and of a branch's own numbers those in all.
     known: dict[str, dict[str, int]] = {"signature": {}, "layout": {}}
-    kept = [*(column.name for column in (*ORBIT, *SPECIAL_ORBIT)), "status", "special_value"]
-    longest = {
-        "return": max(points.shape[1] for points in returns),
-        "unknown": max(one.sizes["unknown"] for one in branches),
-    }
+    kept = [*(column.name for column in (*ORBIT, *SPECIAL_ORBIT)), "status", "special_value", "returns"]
+    longest = {dim: max(one.sizes[dim] for one in branches) for dim in ("return", "unknown")}
     parts, offset = [], 0
-    for k, (one, points) in enumerate(zip(branches, returns, strict=True)):
+    for k, one in enumerate(branches):
         n, special = one.sizes["point"], one.sizes["special"]
         words = {
             "signature": str(one["signature"].attrs["flag_meanings"]).split(),
@@ -205,7 +199,6 @@ def diagram(
         added["special_point"] = one["special_point"] + offset
         numbers = {
             "branch": np.full(n, k),
-            "returns": points,
             "special_branch": np.full(special, k),
             "special_period_number": np.full(special, int(one["period_number"])),
         }

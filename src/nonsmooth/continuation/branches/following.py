@@ -178,6 +178,29 @@ class Following:
         return orbits_dataset(self, record, period_number, policy, {} if origin is None else {"from": origin})
 
 
+def _returns(branch: Following, points: Sequence[PointRecord], p: int) -> FloatArray:
+    """All section points (point, period number, state) of a branch's orbits, from their unknowns."""
+    n = len(branch.system.states)
+    found = np.empty((len(points), p, n))
+    shootings: dict[Any, Shooting] = {}
+    for i, point in enumerate(points):
+        found[i] = point.section
+        if p == 1:
+            continue
+        if point.signature not in shootings:
+            shootings[point.signature] = Shooting(branch.system, point.signature, p, (branch.name,))
+        shooting = shootings[point.signature]
+        times, states = shooting.split(point.X)
+        values = shooting.parameters(point.X)
+        at = np.arange(1, p) * (point.period / p)
+        begins = np.concatenate([[0.0], times])
+        # The visit behind a transition that lies on the section itself.
+        visit = np.searchsorted(begins, at + 1e-12 * point.period, side="right") - 1
+        there = shooting.flow.segments(values, shooting.modes[visit], begins[visit], at - begins[visit], states[visit])
+        found[i, 1:] = there.z[:, :n]
+    return found
+
+
 def orbits_dataset(
     branch: Following, record: BranchRecord, period_number: int, policy: Policy, origin: dict[str, str]
 ) -> xr.Dataset:
@@ -212,6 +235,11 @@ def orbits_dataset(
             {"long_name": "signature", **flag_attributes(texts, dtype=np.int32)},
         ),
         "period_number": ((), np.int64(period_number), {"long_name": f"{labels_of(system).turn}s (0: autonomous)"}),
+        "returns": (
+            ("point", "return", "state"),
+            _returns(branch, points, max(period_number, 1)),
+            {"long_name": "section points"},
+        ),
         "status": ("point", np.zeros(len(points), np.int8), status_attributes()),
     }
     attrs = {"parameter": branch.name, **layout_attributes(layouts, system)}
