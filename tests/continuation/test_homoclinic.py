@@ -1,4 +1,4 @@
-"""Branches whose period diverges: a rimless wheel that barely passes its apex."""
+"""Branches whose period diverges, a rimless wheel that barely passes its apex; and one whose period is finite."""
 
 from __future__ import annotations
 
@@ -47,3 +47,21 @@ def test_a_wheel_that_barely_passes_its_apex(slope: float) -> None:
     assert float(branch["slope"][0]) == pytest.approx(critical, abs=1e-5)
     assert float(branch["period"][0]) > 5.0 * float(branch["period"][-1])
     assert branch["floquet_multipliers"].values[:, 1] == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.02])
+def test_an_explosion_of_canards_is_no_connection(step: float) -> None:
+    """Van der Pol's cycle, e x' = y - x^3 / 3 + x, y' = a - x, grows at a = 1 - e / 8 - 3 e^2 / 32 (to O(e^3)) within
+    exp(-1 / e) of a: period and extremes grow while the parameter stands, and the period stays finite."""
+    e = 0.02
+    system = ns.System(
+        states=["x", "y"],
+        parameters={"a": 0.9, "e": e},
+        modes={"slow": lambda t, u, p: ((u.y - u.x**3 / 3 + u.x) / p.e, p.a - u.x)},
+        indicators={"far": lambda t, u, p: u.x - 10.0},
+    )
+    orbit = ns.find_orbit(system, start={"x": 2.0, "y": 0.0}, transient=100)
+    branch = ns.continue_orbit(orbit, "a", (0.8, 1.1), step=step)
+    assert not any("homoclinic" in str(one) for one in branch["ended_because"].values)
+    assert float(branch["a"][-1]) == pytest.approx(1 - e / 8 - 3 * e**2 / 32, abs=5 * e**3)
+    assert float(branch["period"].max()) < 5.0

@@ -50,6 +50,7 @@ AHEAD = 1e-6  # of the range
 NEARER = 60  # steps back to a boundary from the first orbit behind it, at most
 REACH = 60.0  # times the first of them: as far in all
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
+STANDS = 1e-2  # along the branch: extremes that change less stand, while the orbit is longer
 GROWS = 1e3  # times the first orbit's size and the states' scale: so large, while the parameter stands, it has no bound
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -207,14 +208,21 @@ class AlongOrbits(Policy):
 
     def over(self, point: OrbitPoint) -> str | None:
         """Return ``infinity`` where an orbit grows while the parameter stands, ``homoclinic`` where it only grows
-        longer: states and parameter stand, beside an equilibrium it waits for ever."""
+        longer: states, extremes and parameter stand, beside an equilibrium it waits for ever."""
         shooting, along = point.shooting, np.abs(point.tangent)
         if not along[-1] < WAITS**2:
             return None
         if point.curve.swing(point, shooting.system.scale_vector()) > GROWS:
             return "infinity"
         longer = not shooting.forced and point.tangent[shooting.size - 1] > 0.0
-        return "homoclinic" if longer and along[: shooting.n].max() < WAITS else None
+        if not (longer and along[: shooting.n].max() < WAITS):
+            return None
+        on = point.curve.step(point, WAITS)  # a steep explosion of canards grows as well
+        if on is None:
+            return None
+        moved = np.array([on.path.maximum - point.path.maximum, on.path.minimum - point.path.minimum])
+        size = point.curve.size[: moved.shape[1]]
+        return "homoclinic" if np.nanmax(np.abs(moved) / size) < STANDS * WAITS else None
 
     def why(self, point: OrbitPoint) -> str:
         """Return ``physical`` where the equations do not allow the parameter ahead, or that a cycle has shrunk to an
