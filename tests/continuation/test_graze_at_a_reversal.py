@@ -92,3 +92,28 @@ def test_each_turn_is_one_touch(w: float, mu: float) -> None:
         walls = run["touch_indicator"].values == list(found.system.indicators).index("wall_gap")
         assert int(walls.sum()) == 20
         assert run["touch_clearance"].values[walls] == pytest.approx(0.05 * a, abs=1e-7)
+
+
+@pytest.mark.parametrize(("w", "mu", "step"), [(1.3, 0.05, 0.05), (1.6, 0.05, 0.013)])
+def test_a_graze_of_two_stops_at_once_stands_once(w: float, mu: float, step: float) -> None:
+    """Behind it both impacts are as slow as rounding: no simulation follows them, and the branch goes on.
+
+    Orbits with both impacts are on the side that the branch came from."""
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        parameters={"F": 0.6 * (w**2 - 1), "w": w, "mu": mu},
+        forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+        elements={
+            "rub": E.Coulomb(at="q", friction="mu"),
+            "right": E.Stop(at="q", position=2.0, restitution=0.6),
+            "left": E.Stop(at="q", position=-2.0, side=-1, restitution=0.6),
+        },
+    )
+    orbit = ns.find_orbit(system, progress=False)
+    branch = ns.continue_orbit(orbit, "F", (0.1, 2.5 * (w**2 - 1)), step=step, points=round(6 / step) // 2)
+    places = branch["special_value"].values
+    assert branch["special_kind"].values[0] == "grazing" and np.abs(places[1:] - places[0]).min(initial=1.0) > 1e-2
+    behind = branch["F"].values[int(branch["special_point"][0]) :]
+    assert len(behind) > 10 and (behind[1:11] < behind[0]).all()

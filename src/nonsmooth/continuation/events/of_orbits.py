@@ -51,6 +51,7 @@ NEARER = 60  # steps back to a boundary from the first orbit behind it, at most
 REACH = 60.0  # times the first of them: as far in all
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 STANDS = 1e-2  # along the branch: extremes that change less stand, while the orbit is longer
+UNTOLD = 1e8  # of a multiplier: a simulated round in which rounding grows by more shows another motion
 GROWS = 1e3  # times the first orbit's size and the states' scale: so large, while the parameter stands, it has no bound
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -110,7 +111,9 @@ class AlongOrbits(Policy):
     def unseen(self, step: Step) -> Met | None:
         """The first place on a step where only a simulated round tells that the signature ends."""
         shooting = step.b.shooting
-        if step.virtual or shooting is self._unwatched or step.curve.shows(step.b):
+        if step.virtual or shooting is self._unwatched or np.abs(step.b.multipliers).max(initial=0.0) > UNTOLD:
+            return None
+        if step.curve.shows(step.b):
             return None
         met = Unseen().met(step)
         if met is None or beside(met.point) is not None:
