@@ -361,3 +361,23 @@ def test_a_mass_that_stands_still_adds_its_noise() -> None:
     )
     found = compare(noisy, rig)
     assert float(found["orbit_distance"]) == pytest.approx(np.sqrt(2 / (4 * passes)), rel=0.15)
+
+
+@pytest.mark.parametrize("rate", [20.0, 20.2, 37.3, 50.0])
+def test_samples_beside_impacts_keep_no_distance_from_the_same_motion(rate: float) -> None:
+    """Between two samples about an impact interpolation is off by up to the jump of the speed: in both orbits alike."""
+    system = ns.models.impact_oscillator(A=1.0, e=0.8, c=0.1)
+    turns = 200 + np.arange(int(100 * rate)) / rate
+    run = ns.simulate(system, duration=2 * np.pi * turns[-1] + 0.1, samples=2 * np.pi * turns)
+    measured = xr.Dataset(
+        {
+            "u": (("time", "state"), run["u"].values[np.searchsorted(run["time"].values, 2 * np.pi * turns)]),
+            "phase": ("time", turns),
+        },
+        {"time": 2 * np.pi * turns, "state": ["x", "v"], "state_unit": ("state", ["1", "1"])},
+    )
+    options: dict[str, Any] = {"noise": {"x": 1e-6, "v": 1e-6}, "grid": 64}
+    found = ns.compare(measured, system, settings={"c": (0.1, 1e-9)}, draws=2, **options)
+    assert float(found["orbit_distance"]) < 1e-6 and (found["draw_orbit_distance"] < 1e-6).all()
+    other = ns.compare(measured, system.with_parameters(e=0.75), **options)
+    assert 0.01 < float(other["orbit_distance"]) < 0.2

@@ -132,8 +132,9 @@ def compare(
     -----
     Distances of clouds are in units of the spread of the measured points in each state, those of orbits of the size
     of the motion, or of the noise where that is larger: a mass that stands still adds no more than its noise. The
-    predicted points are given the measured noise (seeded), so that a motion that is predicted exactly is at the
-    distance of the measured cloud's own halves. The energy distance is the root,
+    motion of a System is taken at the recorded phases for them: samples about an impact do not show it. The predicted
+    points are given the measured noise (seeded), so that a motion that is predicted exactly is at the distance of the
+    measured cloud's own halves. The energy distance is the root,
     :math:`\sqrt{2 E|X-Y| - E|X-X'| - E|Y-Y'|}`, as SciPy defines it; NaN with fewer than 40 points in a cloud.
     """
     set_ = read_settings(settings, theory) if isinstance(theory, System) else {}

@@ -35,10 +35,11 @@ def compare_motion(
     phases: list[float],
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
-    noise = model.noise
+    noise, known = model.noise, np.empty(0)
     if "u" in measured:
         turns, u = (measured[name].values.astype(float) for name in ("phase", "u"))
         folded, returns = fold(turns, u, model.grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
+        known = turns[np.isfinite(u).all(axis=1)]
     else:
         folded, returns = None, [measured["section"].values.astype(float)]
     sections = [points[np.isfinite(points).all(axis=1)] for points in returns]
@@ -62,7 +63,7 @@ def compare_motion(
             at = np.empty(len(motions.places))
             at[motions.places] = whole[0, 0]
             predicted = predicted._replace(orbit=motions.orbit(0, at, len(whole)))
-    variables |= _orbits(folded, number, predicted, model)
+    variables |= _orbits(folded, number, predicted, model, motions, known)
     if model.system is not None and model.draws:
         assert predicted.attractor is not None  # a System's prediction has one
         systems, drawn = model.drawn()
@@ -71,7 +72,7 @@ def compare_motion(
             scatter = np.fmax(variables["measured_scatter"][1], noise)
             error = scatter / np.sqrt(max(len(folded) // number, 1))
             closed = variables["measured_orbit"][1], variables["theory_orbit"][1], error
-        variables |= motion_band(systems, model, predicted.attractor, sections, phases, scale, closed)
+        variables |= motion_band(systems, model, predicted.attractor, sections, phases, scale, closed, known)
         variables |= drawn
     named = {"long_name": "phase of the section", "units": "forcing periods"}
     return variables | {"section_phase": ("section_phase", np.array(phases), named)}
@@ -188,7 +189,14 @@ def _shown(folded: FloatArray) -> FloatArray:
     return folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
 
 
-def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, model: Model) -> dict[str, Any]:
+def _orbits(
+    folded: FloatArray | None,
+    number: int,
+    predicted: Prediction,
+    model: Model,
+    motions: Motions | None,
+    known: FloatArray,
+) -> dict[str, Any]:
     if folded is None or predicted.orbit is None:
         return {}
     grid = model.grid
@@ -200,7 +208,10 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, model
         mean, spread = mean_orbit(folded, number)
         a, scatter = common_length(mean, number, length), common_length(spread, number, length)
         b = common_length(predicted.orbit, predicted.period_number, length)
-        found = orbit_distance(a, b, length, model.noise)
+        seen = b
+        if motions is not None and predicted.attractor is not None:
+            seen = motions.shown(0, predicted.attractor, length, known)
+        found = orbit_distance(a, seen, length, model.noise)
         b = np.roll(b, found.whole_shift * grid, axis=0) if found.whole_shift else b
         distances = (found.distance, found.any_phase, found.phase_shift)
     else:
@@ -234,6 +245,7 @@ def motion_band(
     phases: list[float],
     scale: FloatArray,
     closed: tuple[FloatArray, FloatArray, FloatArray] | None,
+    known: FloatArray,
 ) -> dict[str, Any]:
     """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
 
@@ -260,7 +272,8 @@ def motion_band(
             motion = common_length(motions.orbit(i, one.point, one.period_number), one.period_number, length)
             shift = orbit_distance(closed[1], motion, length, model.noise).whole_shift
             orbits.append(np.roll(motion, shift * model.grid, axis=0))
-            to_measured[i] = orbit_distance(closed[0], motion, length, model.noise).distance
+            seen = motions.shown(i, one, length, known)
+            to_measured[i] = orbit_distance(closed[0], seen, length, model.noise).distance
     variables = {
         "draw_period_number": labelled("draw", numbers, "period number for drawn parameters"),
         "draw_energy_distance": labelled(

@@ -20,7 +20,7 @@ from nonsmooth.flow.options import longest_period
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.simulate import check_complete
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.orbits import energy_distance, fold, mean_orbit
+from nonsmooth.identification.compare.orbits import common_length, energy_distance, fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.results.labels import by_code
 from nonsmooth.system.system import System
@@ -37,10 +37,14 @@ class SteadyState(NamedTuple):
     mode: int
 
 
+MOST_SHOWN = 20_000  # samples, the last ones, at whose phases a predicted orbit is laid beside the measured one
+
+
 class Motions:
     """Steady motions of forced systems that differ in their parameters only: one attractor mapper, no labels.
 
-    ``cloud`` and ``orbit`` return the states of the model that are compared; ``phase`` is that of the section.
+    ``cloud``, ``orbit`` and ``shown`` return the states of the model that are compared; ``phase`` is that of the
+    section.
     """
 
     def __init__(self, systems: Sequence[System], model: Model, phase: float = 0.0) -> None:
@@ -95,11 +99,28 @@ class Motions:
 
     def orbit(self, i: int, start: FloatArray, periods: int) -> FloatArray:
         """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
-        grid, end = self.grid, periods * self.periods[i]
-        instants, state = np.linspace(0.0, end, periods * grid + 1), State(start.copy(), self.system.memory_vector())
-        log = self.settler.engine.record(self.settler.engine.prepare(self.points[i : i + 1]), state, end, instants)
+        turns = np.linspace(0.0, periods, periods * self.grid + 1)
+        return fold(turns, self._at(i, start, periods, turns), self.grid).reshape(periods * self.grid, -1)
+
+    def shown(self, i: int, one: SteadyState, length: int, turns: FloatArray) -> FloatArray:
+        """A periodic motion over ``length`` forcing periods, a multiple of its own, as a recording at these phases
+        shows it: what lies between two samples about an impact is lost. As it is where the recording is too short."""
+        turns = turns[min(max(len(turns) - MOST_SHOWN, 0), int(np.searchsorted(turns, turns[-1] - length - 2))) :]
+        at, back = np.unique(turns % one.period_number, return_inverse=True)
+        folded = fold(turns, self._at(i, one.point, one.period_number, at)[back], self.grid)
+        try:
+            mean, _ = mean_orbit(folded, length)
+        except ValueError:
+            return common_length(self.orbit(i, one.point, one.period_number), one.period_number, length)
+        return np.roll(mean, int(np.ceil(turns[0] - 1e-9)) % length * self.grid, axis=0)
+
+    def _at(self, i: int, start: FloatArray, periods: int, turns: FloatArray) -> FloatArray:
+        """States at rising phases."""
+        end, state = periods * self.periods[i], State(start.copy(), self.system.memory_vector())
+        instants, tables = turns * self.periods[i], self.settler.engine.prepare(self.points[i : i + 1])
+        log = self.settler.engine.record(tables, state, end, instants)
         check_complete(log, self.system, state, self.periods[i])
-        return fold(instants / self.periods[i], log.sample_u[:, self.places], grid).reshape(periods * grid, -1)
+        return log.sample_u[:, self.places]
 
 
 def carried(
