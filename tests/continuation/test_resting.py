@@ -347,3 +347,17 @@ def test_a_lift_off_into_a_short_flight_is_no_graze(phase: float) -> None:
     special = ns.special_points(branch)
     assert special["kind"].values.tolist() == ["grazing"]
     assert special["A"].values == pytest.approx([np.sqrt(2)], abs=1e-9)
+
+
+def test_what_lies_beyond_the_range_is_not_listed() -> None:
+    """A mass on a table that is shaken by A cos t rests for A < 1: its flight grows like (A - 1)^(1/2), from A = 1."""
+    floor = ns.elements.Stop(at="q", position=0.0, side=-1, restitution=0.0)
+    system = ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"A": 1.2}, forcing={"q": lambda t, p: p.A * np.cos(t) - 1}, elements={"floor": floor}
+    )
+    orbit = ns.find_orbit(system, start={"q": 0.1}, transient=30)
+    for low, kinds in ((1.0001, []), (0.95, ["grazing"])):
+        branch = ns.continue_orbit(orbit, "A", (low, 2.2))
+        assert branch["special_kind"].values.tolist() == kinds
+        assert branch["special_value"].values == pytest.approx([1.0] * len(kinds), abs=1e-9)
+        assert float(branch["A"].min()) == pytest.approx(low, abs=1e-12)

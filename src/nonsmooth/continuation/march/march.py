@@ -11,7 +11,7 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.blas import one_blas_thread
-from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
+from nonsmooth.continuation.march.event import BESIDE, Event, Met, Step, first_met, special_on
 from nonsmooth.continuation.problems.curve import Place, Point, passing
 
 INTERRUPTED = "Interrupted: what was found until then stands"
@@ -19,6 +19,7 @@ FIRST = 1e-3  # step
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
 AT_LIMIT = 1e-8  # along the branch: as near to a boundary no point follows where it is one of the equations' own
+HALVED = 20  # times, at most
 SPREAD = 0.15  # change of what is known of neighbours (of orbits: chordal, of the multipliers)
 
 
@@ -170,7 +171,9 @@ class _Marching:
                 continue
             if not met and step.cause in self.policy.unseen_on and (unseen := self.policy.unseen(step)):
                 met = [unseen]
-            if met:
+            if met and (beyond := self._beyond(met[0].point, BESIDE)):  # behind a turn that lies beyond the edge
+                step.ends("range", met[0].s, self._at_edge(step.a, met[0].point, *beyond[0]))
+            elif met:
                 step.ends("change", met[0].s, met[0].point)
             self._close(step)
             if self._special(step):
@@ -268,7 +271,7 @@ class _Marching:
             met = sorted([*met, *self.policy.passed_by(step)], key=lambda one: one.s)
         for one in met:
             for which, edge in self._beyond(one.point):  # a fold just beyond the edge of the range
-                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, edge, which) or one.point)
+                step.ends("range", one.s, self._at_edge(step.a, one.point, which, edge))
                 return False
             self.policy.record(self.found, step, one)
             if one.ending is not None:
@@ -276,13 +279,28 @@ class _Marching:
                 return True
         return False
 
-    def _beyond(self, point: Any) -> list[tuple[int, float]]:
-        """The edges of the range that a point lies beyond: places of parameters, each with its edge."""
-        return [
-            (which, low if point.X[which] < low else high)
-            for which, low, high in self.limits.box
-            if not low <= point.X[which] <= high
-        ]
+    def _at_edge(self, a: Any, b: Any, which: int, edge: float) -> Any:
+        """The point at an edge of the range between two points, the second if it is not found: beside a turn the parts
+        are halved that a chord does not follow."""
+        last = b
+        for _ in range(HALVED):
+            if (found := self.curve.at_edge(a, b, edge, which)) is not None:
+                return found
+            middle = self.curve.between(a, b, 0.5 * a.along(b.Y))
+            if middle is None:
+                break
+            a, b = (a, middle) if self._beyond(middle) else (middle, b)
+        return last
+
+    def _beyond(self, point: Any, least: float = 0.0) -> list[tuple[int, float]]:
+        """The edges of the range that a point lies beyond, by ``least`` of its width: places of parameters, each with
+        its edge."""
+        found = []
+        for which, low, high in self.limits.box:
+            edge = low if point.X[which] < low else high
+            if not low <= point.X[which] <= high and abs(point.X[which] - edge) >= least * (high - low):
+                found.append((which, edge))
+        return found
 
     def _ended(self, step: Step) -> bool:
         """Take the step; True where the branch ends with it."""
