@@ -34,9 +34,9 @@ STEEP = 1e-3  # of a tangent: its parameter
 ALONG = (1e-7, 1e-6, 1e-5)  # along the curve of a contact from the orbit where it has no speed
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
 EXACT = 1e-9  # of the orbit's size: orbits that meet are as near as this
-STEPS = (1e-8, 1e-7, 1e-6)  # along a branch, each way: one of them comes to the boundary beside which it was found
+STEPS = (1e-6, 1e-7, 1e-8)  # along a branch, each way: to the boundary beside which it was found, beyond rounding
 JUMP = 1e-6  # of the orbit's size: as far it jumps where an impact becomes slow enough to be completed as rest
-ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same, and a margin is none
+ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
@@ -152,10 +152,8 @@ def _leading_away(found: OrbitPoint, side: float, doubtful: bool) -> OrbitPoint:
     found = found if side * found.rise >= 0.0 else found.turned()
     for ds in STEPS if doubtful else ():
         ahead, behind = (one.curve.step(one, ds) for one in (found, found.turned()))
-        if ahead is not None and behind is not None:
-            no, back = (bool((one.path.margins < -ROUNDING).any()) for one in (ahead, behind))
-            if no != back:
-                return found.turned() if no else found
+        if ahead is not None and behind is not None and ahead.virtual != behind.virtual:
+            return found.turned() if ahead.virtual else found
     return found
 
 
