@@ -145,6 +145,7 @@ def _changes(single: BoolArray, double: BoolArray, price: float) -> list[int]:
 FEWEST = 12  # points with a splitting that can be seen
 STRAY = 12  # points of another period number in a row that end the doubled side
 ALIKE = 8 / 3  # second differences overlap: as many of them say as much as one
+SEEN = 3.0  # standard errors of a point: a splitting that can be seen
 
 
 class MeasuredFlip(NamedTuple):
@@ -189,17 +190,26 @@ def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, read: Doubl
             best = (size.max(), rho, size)
     if best is None:
         return nothing
-    largest, rho, size = best
-    # The square root law and its next order hold near the flip: from half of the largest square on.
-    first = np.flatnonzero(size**2 > 0.5 * largest**2).max() + 1
-    rho, size = rho[first:], size[first:]
-    seen = np.count_nonzero(size > 3.0)
-    if seen < FEWEST:
+    time = 1.0 if closing else -1.0
+    wide, near = (_near(*best, part, time) for part in (0.5, 0.25))
+    if wide is None or near is None:
         return nothing
+    # By how much the flip moves with what is taken for near is an error of the equation.
+    return MeasuredFlip(wide[0], float(np.hypot(wide[1], wide[0] - near[0])), read)
+
+
+def _near(largest: float, rho: FloatArray, size: FloatArray, part: float, time: float) -> tuple[float, float] | None:
+    """Flip and its standard error, from the last amplitude on whose square exceeds this part of the largest square.
+
+    The square root law and its next order hold near the flip. None where too few of these can be seen: of a fast
+    opening all but the end is lost in noise, and nothing says where it began."""
+    first = np.flatnonzero(size**2 > part * largest**2).max() + 1
+    rho, size = rho[first:], size[first:]
+    seen = np.count_nonzero(size > SEEN)
+    if seen < FEWEST:
+        return None
     stop = min(len(size), 2 * seen + FEWEST)
-    rho, size = rho[:stop], size[:stop]
-    found = _fitted(rho, size, 1.0 if closing else -1.0)
-    return nothing if found is None else MeasuredFlip(*found, read)
+    return _fitted(rho[:stop], size[:stop], time)
 
 
 def _reach(numbers: IntArray, cut: int, number: int) -> int:
