@@ -259,11 +259,11 @@ def test_four_fields_that_leave_the_motion_on_two_surfaces_open() -> None:
     assert caught.value.time < 1.5
 
 
-def four_fields(speed: dict[str, Any], names: tuple[str, ...], one: Any, two: Any) -> ns.System:
+def four_fields(speed: dict[str, Any], names: tuple[str, ...], one: Any, two: Any, **parameters: float) -> ns.System:
     """Modes m and p either side of two surfaces, each with its field."""
     return ns.System(
         states=names,
-        parameters={},
+        parameters=parameters,
         modes=speed,
         indicators={"one": one, "two": two},
         transitions=[
@@ -380,3 +380,23 @@ def test_a_surface_that_ends_at_another_one() -> None:
     run = ns.simulate(system, start=[0.25, -1.0], duration=3.0)
     assert run.crossing_time.values == pytest.approx([0.25, 1.0], abs=1e-12)
     assert run.u.values[-1] == pytest.approx([1.0, 0.5], abs=1e-12)
+
+
+def test_motion_that_stays_where_two_surfaces_meet_by_taylor_series() -> None:
+    """x = 0.2 cos t, y = 0: what y should be is all rounding, and a run may begin there, or go on there in a sweep."""
+    fields = {
+        "mm": lambda t, u, p: (1, 1 + p.A * np.cos(t)),
+        "pm": lambda t, u, p: (-1, 1 - u.y),
+        "mp": lambda t, u, p: (2, -0.5 - u.y),
+        "pp": lambda t, u, p: (-0.6 - u.x, -1),
+    }
+    system = four_fields(fields, ("x", "y"), lambda t, u, p: u.x - 0.2 * np.cos(t), lambda t, u, p: u.y, A=0.5)
+    where = {"start": [0.2, 0.0], "mode": "one_two_sliding"}
+    run = ns.simulate(system, duration=2.0, samples=21, method="taylor", **where)
+    assert run.u.values[:, 0] == pytest.approx(0.2 * np.cos(run.time.values), abs=1e-9)
+    assert abs(run.u.values[:, 1]).max() < 1e-15
+    swept = ns.sweep(
+        system, "A", [0.3, 0.49322033898305084], direction=None, start=[0.3, -1.0], transient=1, keep=3, progress=False
+    )
+    assert (swept.status == 0).all() and (swept.period_number == 1).all()
+    assert swept.section.values[..., 0] == pytest.approx(0.2, abs=1e-9)

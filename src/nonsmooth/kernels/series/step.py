@@ -207,6 +207,7 @@ def make_step(i, form, net, section, wanted, work, r_max):
     pending, hit, x, calm, halvings, error, sure = -1, -1, NONE, False, 0, 0.0, 0.0
     if h < 0.0:
         return False
+    least = 1e-16 * t + 1e-30 * h
     for j in range(n_i):
         work.measured[j] = 0.0  # what an instant has shown of rounding is for all that follows at that instant
     while True:
@@ -243,7 +244,7 @@ def make_step(i, form, net, section, wanted, work, r_max):
         if sure >= whole:
             break
         h, tally[place.LANDING] = sure, 0
-        if not (h > 1e-16 * t):
+        if not (h > least):
             return False
     part = h
     if pending >= 0:

@@ -244,7 +244,7 @@ def misfits(form, work, tau, length):
         doubt = fabs(vals_near[i] - C[n + i, 0]) + (rtol + NOISE) * scale[i]
         for j in range(n):
             kept = at[j]
-            at[j] += NOISE * (fabs(kept) + fabs(u[j]))
+            at[j] += NOISE * (fabs(kept) + fabs(u[j])) + noise[j] * length
             values(mode, t + tau, at, q, vals_near)
             at[j] = kept
             doubt += fabs(vals_near[i] - vals[i])
