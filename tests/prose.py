@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -71,32 +71,28 @@ def terms(text: str, allowed: tuple[str, ...] = ()) -> Iterator[str]:
                 yield f"{found[0]!r} (... {around} ...): {term}"
 
 
-def of_source(path: Path, words_too: bool = True) -> Iterator[str]:
-    """The complaints about a Python file: its docstrings, and (``words_too``) the sentences in its strings."""
-    allowed = ALLOWED.get(path.name, ())
+def of_source(path: Path, words_too: bool = True, classes: dict[str, str] | None = None) -> Iterator[str]:
+    """The complaints about a Python file: its docstrings, and (``words_too``) the sentences in its strings.
+
+    ``classes``: the places of those, and of types with a name, that are defined so far, to which its own are added."""
+    allowed, file = ALLOWED.get(path.name, ()), path.relative_to(ROOT)
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, documented) and (text := ast.get_docstring(node)):
-            place = f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 1)}"
-            if complaint := beginning(text):
-                yield f"{place}: the docstring {complaint}"
-        if words_too and isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
-            for complaint in terms(node.value, allowed):
-                yield f"{path.relative_to(ROOT)}:{node.lineno}: {complaint}"
-
-
-def classes(paths: Iterable[Path]) -> Iterator[str]:
-    """The complaints about classes, and types with a name, of the same name."""
-    places: dict[str, str] = {}
-    for path in paths:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            name = node.name if isinstance(node, ast.ClassDef) else ""
-            if isinstance(node, ast.AnnAssign) and "TypeAlias" in ast.unparse(node.annotation):
-                name = ast.unparse(node.target)
-            if name:
-                place = f"{path.relative_to(ROOT)}:{node.lineno}"
-                if (other := places.setdefault(name, place)) != place:
-                    yield f"{place}: the class {name} is defined at {other} too: a class name means one thing"
+        name = ""
+        if isinstance(node, documented) and (text := ast.get_docstring(node)) and (complaint := beginning(text)):
+            yield f"{file}:{getattr(node, 'lineno', 1)}: the docstring {complaint}"
+        if isinstance(node, ast.Constant):
+            if words_too and isinstance(node.value, str) and " " in node.value.strip():
+                for complaint in terms(node.value, allowed):
+                    yield f"{file}:{node.lineno}: {complaint}"
+        elif isinstance(node, ast.ClassDef):
+            name = node.name
+        elif isinstance(node, ast.AnnAssign) and "TypeAlias" in ast.unparse(node.annotation):
+            name = ast.unparse(node.target)
+        if name and classes is not None:
+            place = f"{file}:{node.lineno}"
+            if (other := classes.setdefault(name, place)) != place:
+                yield f"{place}: the class {name} is defined at {other} too: a class name means one thing"
 
 
 def unmerged(text: str) -> bool:
@@ -106,10 +102,11 @@ def unmerged(text: str) -> bool:
 
 def complaints() -> Iterator[str]:
     """All complaints, one a line."""
+    classes: dict[str, str] = {}
     for sources in (ROOT / "src", ROOT / "studies"):
         for path in sorted(sources.rglob("*.py")):
-            yield from of_source(path, words_too="tests" not in path.parts)
-    yield from classes(path for root in ("src", "studies/*/src") for path in sorted(ROOT.glob(f"{root}/**/*.py")))
+            inside = "tests" not in path.relative_to(ROOT).parts
+            yield from of_source(path, inside, classes if "src" in path.relative_to(ROOT).parts else None)
     for folder in ("benchmarks", "docs", "examples", "tests"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             yield from of_source(path, words_too=folder != "tests")  # the words are data there

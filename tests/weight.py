@@ -27,29 +27,28 @@ SLACK = 60  # tokens by which a room may be over: a mend needs no new budget
 
 def weigh(text: str, generates: bool) -> Counter[str]:
     """Return the counts of one file of Python; of one that ``generates`` code its texts count by their words."""
-    tree = ast.parse(text)
+    nodes = [*ast.walk(ast.parse(text))]
     quoted: set[int] = set()  # lines of docstrings
     hidden = 0  # tokens of code that stands in texts
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, DEFINITIONS) and node.body and isinstance(node.body[0], ast.Expr):
             value = node.body[0].value
             if isinstance(value, ast.Constant) and isinstance(value.value, str):
                 quoted.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
-    for node in ast.walk(tree):
-        if generates and isinstance(node, ast.Constant) and isinstance(node.value, str) and node.lineno not in quoted:
+    for node in nodes if generates else ():
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.lineno not in quoted:
             hidden += words_of(node.value)
     tokens = [
         one
         for one in tokenize.generate_tokens(io.StringIO(text).readline)
         if one.type not in LAYOUT and one.start[0] not in quoted
     ]
-    functions = [node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
     return Counter(
         files=1,
         lines=text.count("\n"),
         tokens=len(tokens) + hidden,
-        functions=len(functions),
-        classes=sum(isinstance(node, ast.ClassDef) for node in ast.walk(tree)),
+        functions=sum(isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) for node in nodes),
+        classes=sum(isinstance(node, ast.ClassDef) for node in nodes),
         doc=len(quoted),
     )
 
