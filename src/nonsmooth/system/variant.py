@@ -152,17 +152,9 @@ class Derivatives:
         """Jacobian of a vector field, (n, n_of)."""
         return tuple(self._gradient(entry, of) for entry in self.traced.fields[mode])
 
-    def divergence(self, mode: int) -> sp.Expr:
-        """Divergence of a vector field: the rate at which it changes volumes."""
-        return sp.expand(sum(self.field(mode, "u")[i][i] for i in range(len(self.traced.u))))
-
     def indicator(self, indicator: int, of: str = "u") -> Vector:
         """Gradient of an indicator, (n_of,)."""
         return self._gradient(self.traced.indicators[indicator], of)
-
-    def indicator_hessian(self, indicator: int) -> Matrix:
-        """Second derivatives of an indicator in u, (n, n)."""
-        return tuple(self._gradient(entry, "u") for entry in self.indicator(indicator, "u"))
 
     def output(self, output: int, mode: int, of: str = "u") -> Vector:
         """Gradient of an output in a mode, (n_of,)."""
