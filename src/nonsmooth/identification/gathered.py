@@ -210,13 +210,15 @@ def _finer(length: FloatArray) -> Callable[[FloatArray], FloatArray]:
 
 def _at(wanted: FloatArray, value: FloatArray, other: FloatArray, flag: bool) -> FloatArray:
     """``other`` where ``value``, which rises or falls, has the wanted values; NaN beyond its ends."""
-    from scipy.interpolate import interp1d
-
-    ends = value.min(), value.max()
-    within = np.clip(wanted, *ends)
-    rows = np.asarray(interp1d(value, other, kind="next" if flag else "linear", axis=0)(within))
-    rows[np.abs(wanted - within) > 1e-9 * np.abs(ends).sum()] = np.nan  # an edge of the range, to rounding
-    return rows
+    order = np.argsort(value, kind="stable")
+    value, flat = value[order], other[order].reshape(len(value), -1)
+    if flag:
+        rows = flat[np.clip(np.searchsorted(value, wanted), 0, len(value) - 1)]
+    else:
+        rows = np.stack([np.interp(wanted, value, column) for column in flat.T], axis=-1)
+    near = 1e-9 * (abs(value[0]) + abs(value[-1]))  # an edge of the range, to rounding
+    rows[(wanted < value[0] - near) | (wanted > value[-1] + near)] = np.nan
+    return rows.reshape(len(wanted), *other.shape[1:])
 
 
 def matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:

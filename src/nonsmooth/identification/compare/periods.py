@@ -182,28 +182,22 @@ def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, read: Doubl
     where, cloud, known = at[order], points[order], numbers[order]
     cut = cut if closing else len(at) - 1 - cut
     begin, end = _reach(known, cut, 2 * p), len(known) - _reach(known[::-1], len(known) - 1 - cut, p)
-    best: tuple[float, FloatArray, FloatArray] | None = None
-    for k in range(p):
-        one = slice(begin + k, end, p)
-        rho, size = _splitting(where[one], cloud[one])
-        if len(size) >= FEWEST and (best is None or size.max() > best[0]):
-            best = (size.max(), rho, size)
-    if best is None:
-        return nothing
-    time = 1.0 if closing else -1.0
-    wide, near = (_near(*best, part, time) for part in (0.5, 0.25))
+    parts = (slice(begin + k, end, p) for k in range(p))
+    splits = (_splitting(where[part], cloud[part]) for part in parts)
+    widest = max(splits, key=lambda one: float(one[1].max(initial=0.0)))
+    wide, near = (_near(*widest, share, 1.0 if closing else -1.0) for share in (0.5, 0.25))
     if wide is None or near is None:
         return nothing
     # By how much the flip moves with what is taken for near is an error of the equation.
     return MeasuredFlip(wide[0], float(np.hypot(wide[1], wide[0] - near[0])), read)
 
 
-def _near(largest: float, rho: FloatArray, size: FloatArray, part: float, time: float) -> tuple[float, float] | None:
-    """Flip and its standard error, from the last amplitude on whose square exceeds this part of the largest square.
+def _near(rho: FloatArray, size: FloatArray, share: float, time: float) -> tuple[float, float] | None:
+    """Flip and its standard error, from the last amplitude on whose square exceeds this share of the largest square.
 
     The square root law and its next order hold near the flip. None where too few of these can be seen: of a fast
     opening all but the end is lost in noise, and nothing says where it began."""
-    first = np.flatnonzero(size**2 > part * largest**2).max() + 1
+    first = np.flatnonzero(size**2 > share * size.max(initial=0.0) ** 2).max(initial=-1) + 1
     rho, size = rho[first:], size[first:]
     seen = np.count_nonzero(size > SEEN)
     if seen < FEWEST:
