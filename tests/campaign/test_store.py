@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from nonsmooth.campaign import work
 from nonsmooth.campaign.plan import plan
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.store import describe_store, open_store
+from nonsmooth.campaign.work import difference
 from nonsmooth.diagrams.chart import chart, plan_chart
 from nonsmooth.errors import DataFileError
 
@@ -231,10 +233,48 @@ def test_charts_and_basins_in_a_store(tmp_path: Path) -> None:
     assert basins(system, plane, store=tmp_path / "b.zarr", **QUIET).identical(basins(system, plane, **QUIET))
 
 
+def test_a_grid_named_the_other_way_round_is_another_work(tmp_path: Path) -> None:
+    """Places lie row by row in the order of the grid's names."""
+    system, omega, rho = ns.models.discontinuous_support(), np.linspace(3, 7, 4), np.linspace(0.1, 0.3, 3)
+    chart(system, {"omega": omega, "rho": rho}, store=tmp_path / "chart.zarr", **QUIET)
+    with pytest.raises(DataFileError, match="its options differ in grid"):
+        chart(system, {"rho": rho, "omega": omega}, store=tmp_path / "chart.zarr", **QUIET)
+    one, other = ({"options": dict.fromkeys(names, 1)} for names in ("ab", "ba"))
+    assert difference(one, other) == "its options differ in their order"
+
+
+def two_frictions() -> ns.System:
+    """Its modes are made, and numbered, as they are visited; each call gives it with none visited."""
+    rubs = {name: ns.elements.Coulomb(at="q", friction=mu, belt=0.2) for name, mu in (("a", 0.1), ("b", 0.05))}
+    stop = ns.elements.Stop(at="q", position=0.3, restitution=0.5)
+    force = {"q": lambda t, p: p.F * np.cos(p.w * t)}
+    return ns.mechanical(1.0, 0.1, 1.0, forcing=force, parameters={"F": 0.8, "w": 0.9}, elements={**rubs, "stop": stop})
+
+
+def test_modes_in_a_store_do_not_depend_on_what_a_process_has_visited(tmp_path: Path) -> None:
+    plane = {"q": np.linspace(-0.8, 0.2, 4), "v_q": np.linspace(-0.5, 0.5, 3)}
+    plain, other = basins(two_frictions(), plane, **QUIET), two_frictions()
+    ns.simulate(other, periods=3, start={"v_q": -1.0})
+    for system in (two_frictions(), two_frictions(), other):
+        assert basins(system, plane, store=tmp_path / "b.zarr", **QUIET).identical(plain)
+    first, second = (plan_chart(s, {"F": [0.8], "w": [0.9]}, keep=20).work.settler for s in (system, two_frictions()))
+    names = list(system.modes)
+    found = second.retold(first.told(np.arange(len(names))))
+    assert [list(second.system.modes)[k] for k in found] == names
+
+
+def test_a_section_in_a_mode_travels_with_the_mode() -> None:
+    system = two_frictions()
+    ns.simulate(system, periods=3, start={"v_q": -1.0})
+    section = ns.Poincare("stop_gap", rising=None, mode="a_back_b_back_stop_open")
+    work = plan_chart(system, {"F": [0.8, 0.9], "w": [0.9, 1.0]}, section=section, keep=20, transient=20).work
+    there = pickle.loads(pickle.dumps(work)).compute(0)
+    for name, values in work.compute(0).items():
+        np.testing.assert_array_equal(values, there[name])
+
+
 def test_a_chunk_in_another_process_is_the_same() -> None:
     """A settler travels as the system's text; what comes back has the same bits."""
-    import pickle
-
     work = plan_chart(
         ns.models.discontinuous_support(g=0.02), {"omega": np.linspace(3, 7, 12), "rho": np.linspace(0.1, 0.3, 9)}
     ).work

@@ -14,7 +14,7 @@ from nonsmooth.attractors.basins_attractors import Attractor, find_attractors
 from nonsmooth.attractors.basins_found import NONE, Patience
 from nonsmooth.attractors.basins_matching import numbered
 from nonsmooth.attractors.basins_measures import share_errors, starts_needed
-from nonsmooth.attractors.basins_work import StartsWork, settled_from
+from nonsmooth.attractors.basins_work import StartsWork
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.run import run, whole_or_part
@@ -91,7 +91,7 @@ def basin_fractions(
     fill = partial(run, work, **kept_of(options))
 
     def result(columns: dict[str, Any], whole: bool) -> xr.Dataset | None:
-        runs = settled_from(columns)
+        runs = work.settled(columns)
         if whole:
             warn_if_small(system, starts, runs.maximum, runs.minimum)
         done = (runs.status.reshape(len(numbers), n_starts) != codes.INTERRUPTED).all(axis=1)

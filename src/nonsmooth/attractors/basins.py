@@ -18,7 +18,7 @@ from nonsmooth.attractors.basins_measures import (
     starts_needed,
     uncertain_part,
 )
-from nonsmooth.attractors.basins_work import StartsWork, settled_from
+from nonsmooth.attractors.basins_work import StartsWork
 from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler, settler_for
 from nonsmooth.campaign.run import run, whole_or_part
@@ -123,7 +123,7 @@ def basins(
     fill = partial(run, work, **kept_of(options))
 
     def result(columns: dict[str, Any], whole: bool) -> xr.Dataset:
-        runs = settled_from(columns)
+        runs = work.settled(columns)
         if whole:
             warn_if_small(system, starts, runs.maximum, runs.minimum)
         attractors = find_attractors(settler, point, runs, Patience() if whole else NONE)

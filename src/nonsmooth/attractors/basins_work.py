@@ -32,7 +32,7 @@ class StartsWork:
     def columns(self) -> dict[str, ColumnType]:
         n = self.starts.shape[1]
         kinds = {"period_number": "i8", "status": "i8", "mode": "i8"}
-        wide = {"maximum": (n,), "minimum": (n,), "last": (self.settler.width,)}
+        wide = {"maximum": (n,), "minimum": (n,), "last": (self.settler.width,), "mode": np.shape(self.settler.told(0))}
         unknown = {"status": codes.INTERRUPTED}
         return {
             item.name: ColumnType(kinds.get(item.name, "f8"), wide.get(item.name, ()), unknown.get(item.name, 0))
@@ -58,9 +58,9 @@ class StartsWork:
         found = self.settler.run(
             self.points[first : int(rows[-1]) + 1], rows - first, self.starts[which], begin=self.settler.section_phase
         )
+        found.mode = self.settler.told(found.mode)
         return {item.name: getattr(found, item.name) for item in fields(Settled)}
 
-
-def settled_from(columns: Mapping[str, Any]) -> Settled:
-    """The columns of a :class:`StartsWork` as runs."""
-    return Settled(**columns)
+    def settled(self, columns: Mapping[str, Any]) -> Settled:
+        """The columns as runs."""
+        return Settled(**{**columns, "mode": self.settler.retold(columns["mode"])})

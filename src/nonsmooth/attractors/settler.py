@@ -82,7 +82,21 @@ class Settler:
         given = {item.name: getattr(self, item.name) for item in fields(self) if item.init}
         options = {name: given.pop(name) for name in ("system", "engine")}
         text, values = options["system"].to_text(), dict(options["system"].values)
-        return _remade, (text, values, options["engine"].name, given)
+        return _remade, (text, values, options["engine"].name, given, self.told([self.plan.mode]))
+
+    def told(self, modes: Any) -> Any:
+        """Modes as data for another process: those made when they are first visited have numbers of this one."""
+        patterns = self.system.traced.patterns
+        return modes if patterns is None else np.array(patterns.visited)[modes]
+
+    def retold(self, data: Any) -> Any:
+        """The numbers of modes that were told."""
+        patterns = self.system.traced.patterns
+        if patterns is None:
+            return data
+        every, which = np.unique(np.atleast_2d(data), axis=0, return_inverse=True)
+        numbers = np.array([patterns.retold_mode(one) for one in every], dtype=np.int64)
+        return numbers[which.ravel()]
 
     def load(self) -> None:
         """Compile or load the kernels now, before threads ask for them."""
@@ -309,11 +323,13 @@ def _system_from(text: str) -> System:
     return System.from_text(text)
 
 
-def _remade(text: str, values: Mapping[str, float], method: str, given: Mapping[str, Any]) -> Settler:
+def _remade(text: str, values: Mapping[str, float], method: str, given: Mapping[str, Any], mode: Any) -> Settler:
     system = _system_from(text).with_parameters(values)
     # "auto" takes tolerances that the exact flow has no use for
     engine = engine_for(system, **given["solver"] | {"method": "auto" if method == "exact" else method})
-    return Settler(system, engine, **given)
+    found = Settler(system, engine, **given)
+    plan = found.plan
+    return found if plan.mode < 0 else replace(found, plan=plan._replace(mode=int(found.retold(mode)[0])))
 
 
 USUAL = 1.5  # powers of ten: a motion this near to its scale is taken to have that size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import platform
 import time
 from collections.abc import Callable, Mapping
@@ -130,15 +131,18 @@ def described(work: ChunkedWork) -> dict[str, Any]:
 
 
 def difference(record: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    """In what a recorded work differs from the wanted one, in words."""
-    keys = [name for name in wanted if record.get(name) != wanted[name]]
+    """In what a recorded work differs from the wanted one, in words; mappings by the order of their names too."""
+
+    def unlike(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
+        return [name for name in {**b, **a} if json.dumps(a.get(name)) != json.dumps(b.get(name))]
+
+    keys = unlike({name: record.get(name) for name in wanted}, wanted)
     if keys == ["kernels"]:
         return "it was computed by another version of the package"
     for name in keys:
         a, b = record.get(name), wanted[name]
         if isinstance(a, dict) and isinstance(b, dict):
-            inner = [one for one in {**a, **b} if a.get(one) != b.get(one)]
-            return f"its {name} differ in {', '.join(map(str, inner[:4]))}"
+            return f"its {name} differ in {', '.join(unlike(b, a)[:4]) or 'their order'}"
     return f"it differs in {', '.join(keys)}"
 
 
