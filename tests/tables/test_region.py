@@ -141,9 +141,35 @@ def test_every_value_of_a_force_lies_between_both_of_its_ends(struck) -> None:
     assert ns.region(chart, "rub_force < -0.2 and -2*force > 0.5").all()
     assert ns.region(chart, "abs(rub_force) > 0.2 and abs(rub_force) < 0.4 and force > -0.31").all()
     assert not ns.region(chart, "rub_force < -0.4").any() and not ns.region(chart, "abs(rub_force) < 0.2").any()
-    for text in ("impact_speed > 0.1", "impact_speed != 7", "0.1 < right_impact_speed"):  # the largest alone is known
+
+
+def test_speeds_of_impacts_lie_between_zero_and_the_largest(struck) -> None:
+    largest = np.maximum(struck.left_impact_speed_maximum, struck.right_impact_speed_maximum)
+    assert ns.region(struck, "impact_speed != 7 and impact_speed >= 0").all()
+    assert (ns.region(struck, "abs(impact_speed) < 0.5") == (largest < 0.5)).all()
+    found = ns.region(struck, "impact_speed*(w - 0.7) < 0.1")
+    assert found.sel(w=0.7).all() and (found == (largest * (struck.w - 0.7) < 0.1)).all()
+    for text in ("impact_speed > 0.1", "impact_speed != 0.1", "0.1 < right_impact_speed"):
         with pytest.raises(ValueError, match="holds the largest value alone"):
             ns.region(struck, text)
+
+
+def test_what_has_no_value_is_not_known(struck) -> None:
+    """The impulse of one impact where there is none; a root of less than zero."""
+    none = (struck.right_impacts == 0).values
+    assert 0 < none.sum() < none.size
+    for text in (
+        "right_impulse/right_impacts > 0",
+        "right_impulse/right_impacts <= 0",
+        "0*F != right_energy/right_impacts",
+    ):
+        assert ns.region(struck, text).attrs["unknown"] == none.sum()
+        assert not ns.region(struck, text).values[none].any()
+    found = ns.region(struck, "sqrt(F - 0.6) < 100 or q < 100")
+    assert (found == (struck.F >= 0.6)).all() and found.attrs["unknown"] == 10
+    orbit = ns.find_orbit(ns.models.impact_oscillator(), progress=False)
+    with pytest.raises(ValueError, match="mode is text"):
+        ns.region(orbit, "mode == 0")
 
 
 def test_no_result_no_text(struck) -> None:

@@ -56,7 +56,8 @@ def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
     -------
     xarray.DataArray
         True and False over the result's points, with the condition as its ``long_name``. Where a quantity is not known
-        (a point that failed or was not computed) it is False; ``unknown`` in its attributes counts these points.
+        (a point that failed or was not computed) or what is compared has no value (``impulse/impacts`` where there are
+        none) it is False; ``unknown`` in its attributes counts these points.
 
     Raises
     ------
@@ -86,23 +87,26 @@ def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
     symbols = {name: sp.Symbol(name, real=True) for name in names}
     read = read_expression(ast.unparse(tree), symbols)
     held = {symbols[name]: _held(data, name, known) for name in names}
-    whole = xr.DataArray(True)
-    for end in chain.from_iterable(held.values()):
-        whole = whole & end.notnull()
-    inside = whole & _holds(read, held, condition)
+    compared: list[Any] = [xr.DataArray(0.0), *chain.from_iterable(held.values())]
+    with np.errstate(all="ignore"):
+        inside = _holds(read, held, condition, compared)
+        whole = reduce(operator.and_, (~np.isnan(one) for one in compared))
+        inside = whole & inside
     kept = [dim for dim in data.dims if dim in inside.dims]
     inside, whole = (array.transpose(*kept).astype(bool) for array in (inside, whole & xr.ones_like(inside)))
     inside.attrs = {"long_name": " ".join(condition.split()), "unknown": int(inside.size - whole.sum())}
     return inside.rename("region")
 
 
-#: A quantity by the values that it takes: its one value, or the least (-inf: not known) and the largest.
+#: A quantity by the values that it takes: its one value, or the least (of speeds of impacts zero) and the largest.
 _Ends = tuple[Any, ...]
 
 
 def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Ends:
     if name in known or name in data.coords:
         one = quantity(data, name, known)
+        if one.dtype.kind not in "iufb":
+            raise ValueError(f"{name} is text in this result: a condition compares numbers")
         if name != "period_number":
             return (one,)
         # It is -1 of an attractor that is not there, and 0 of a run that failed or had not settled too.
@@ -119,7 +123,7 @@ def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _En
         return (known[stems[0]],)
     upper: list[Any] = [known[f"{stem}_maximum"] if f"{stem}_maximum" in known else known[stem] for stem in stems]
     lower: list[Any] = [
-        known[f"{stem}_minimum"] if f"{stem}_minimum" in known else one if stem in known else xr.full_like(one, -np.inf)
+        known[f"{stem}_minimum"] if f"{stem}_minimum" in known else one if stem in known else xr.zeros_like(one)
         for stem, one in zip(stems, upper, strict=True)
     ]
     return reduce(np.minimum, lower), reduce(np.maximum, upper)
@@ -159,28 +163,29 @@ class _Chains(ast.NodeTransformer):
         return ast.BoolOp(ast.And(), [ast.Compare(left, [op], [right]) for left, op, right in pairs])
 
 
-def _holds(read: Any, held: Mapping[sp.Symbol, _Ends], condition: str) -> Any:
-    """The condition over the points."""
+def _holds(read: Any, held: Mapping[sp.Symbol, _Ends], condition: str, compared: list[Any]) -> Any:
+    """The condition over the points; what it compares is added to ``compared``."""
     if read in (sp.true, sp.false):
         return bool(read)
     if isinstance(read, sp.And | sp.Or):
-        parts = [_holds(part, held, condition) for part in read.args]
+        parts = [_holds(part, held, condition, compared) for part in read.args]
         return reduce(operator.and_ if isinstance(read, sp.And) else operator.or_, parts)
     if isinstance(read, sp.Ne):  # of a range both ends may differ from what lies between them
-        return operator.or_(*(_holds(one(*read.args, evaluate=False), held, condition) for one in (sp.Lt, sp.Gt)))
+        both = (one(*read.args, evaluate=False) for one in (sp.Lt, sp.Gt))
+        return operator.or_(*(_holds(one, held, condition, compared) for one in both))
     if type(read) not in _COMPARE:
         raise ValueError(f"{shortened(condition)} is no condition: write {_FORM}")
     left, right = read.args
     cases = _cases(left - right, held, condition)
-    parts = [_COMPARE[type(read)](_value(left, one), _value(right, one)) for one in cases]
-    for one, part in zip(cases, parts, strict=True):
-        unknown = [str(symbol) for symbol, value in one.items() if len(held[symbol]) > 1 and np.isinf(value).all()]
-        if unknown and (np.isinf(_value(left - right, one)) & ~part).any():
-            name = unknown[0]
-            raise ValueError(
-                f"{shortened(condition)}: of {name} this result holds the largest value alone, which says nothing of "
-                f"the smaller ones: compare it from below ({name} < ...), or take the quantity that ends in _maximum"
-            )
+    sides = [(_value(left, one), _value(right, one)) for one in cases]
+    compared += chain.from_iterable(sides)
+    parts = [_COMPARE[type(read)](*pair) for pair in sides]
+    speeds = [name for name in map(str, read.free_symbols) if name.endswith("impact_speed")]
+    if speeds and len(parts) > 1 and (~parts[0] & parts[1]).any():
+        raise ValueError(
+            f"{shortened(condition)}: of {speeds[0]} this result holds the largest value alone, which says nothing of "
+            f"the smaller ones: compare it from below ({speeds[0]} < ...), or take the quantity that ends in _maximum"
+        )
     return reduce(operator.and_, parts)
 
 
