@@ -202,6 +202,37 @@ def test_a_draw_without_a_motion_has_no_period_number() -> None:
         assert np.unique(band[name]) == pytest.approx([np.mean(c > 0)]), name
 
 
+def test_probabilities_are_shares_of_all_draws() -> None:
+    """With damping c the orbit of a linear oscillator is stable where c > 0; for w < 0 the verb refuses."""
+    s = ns.mechanical(1.0, "c", 1.0, parameters={"c": 0.3, "w": 2.0}, forcing={"q": lambda t, p: np.cos(2.0 * t)})
+
+    def orbit(one: ns.System) -> Any:
+        if one.values["w"] < 0:
+            raise ns.SolveError("refused")
+        return ns.find_orbit(one, period_number=1, transient=0, progress=False)
+
+    band = ns.propagate({}, orbit, s, settings={"c": (0.3, 0.4), "w": (1.0, 1.5)}, draws=24, **QUIET)
+    there, c = band["drawn_w"].values > 0, band["drawn_c"].values
+    assert 0 < int(band["failed"]) == np.sum(~there) and 0 < np.sum(there & (c < 0))
+    assert float(band["stable_share"]) == np.mean(there) == float(band["period_number_share"])
+    assert float(band["stable_probability"]) == np.mean(there & (c > 0))
+    assert band["period_number_probability"].sel(period_value=1) == np.mean(there)
+
+
+def test_the_crossings_of_a_run_are_matched_where_they_are_the_same_ones() -> None:
+    """A steady force drives the mass into the stop on its side: one impact for each draw, there or here."""
+    stops = {name: ns.elements.Stop(at="q", position=x, side=x, restitution=0.5) for name, x in (("a", -1), ("b", 1))}
+    s = ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"s": 0.5}, forcing={"q": lambda t, p: 0.3 * p.s / abs(p.s)}, elements=stops
+    )
+    band = ns.propagate({}, ns.simulate, s, duration=4.0, settings={"s": (0.5, 0.7)}, draws=20, **QUIET)
+    share = np.mean(band["drawn_s"].values > 0)
+    assert band.sizes["crossing"] == 1 and 0.2 < share < 1
+    assert band["u_before_quantiles"].sel(state="q").values == pytest.approx(np.ones((3, 1)))
+    assert band["crossing_time_share"].values == pytest.approx([share])
+    assert band["crossing_time_quantiles"].values == pytest.approx(np.full((3, 1), np.sqrt(2 / 0.3)))
+
+
 def test_of_a_diagram_of_branches_the_special_points_have_distributions() -> None:
     s = support().with_parameters(g=-0.0045, rho=0.42)
     found = known(s, {"k": 0.004})

@@ -21,6 +21,7 @@ LISTS = {
     "jump": ("jump_value", ("jump_variable", "jump_direction")),
     "special": ("special_value", ("special_kind", "kind")),
 }
+EVENTS = (("crossing",), ("touch",))  # dims of what happened in a run, one after the other
 FINER = 8  # points to a step of a drawn branch, on a cubic
 MOST = 10**8  # numbers kept over all draws
 FAILURES = 3  # reasons that are repeated
@@ -49,7 +50,10 @@ class Gathered:
         """Keep what a draw gave."""
         result = _same_attractors(self.centre, result, self.plain)
         there = {name: _at_same(self.centre[name], result[name]) for name in self.plain if name in result}
-        row = {name: array.values for name, array in there.items() if array.shape == self.centre[name].shape}
+        named = [one for one in self.centre.values() if one.dims in EVENTS and one.dtype.kind in "iuU"]
+        other = {dim for one in named for dim in one.dims if not np.array_equal(one, result.get(one.name, np.nan))}
+        alike = {name: array for name, array in there.items() if not other & set(array.dims)}
+        row = {name: array.values for name, array in alike.items() if array.shape == self.centre[name].shape}
         if "period_number" in row and "status" in result and result["status"].shape == row["period_number"].shape:
             row["period_number"] = np.where(np.isin(result["status"], MOVES), row["period_number"], np.nan)
         if self.along:
@@ -95,12 +99,13 @@ class Gathered:
     def _of(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
         array = self.centre[name]
         if name.rpartition("_")[2] == "stable" or array.dtype.kind == "b":
-            mean = xr.DataArray(np.asarray(stack, float)).mean("dim_0").values  # NaN where no draw has this point
-            return {f"{name}_probability": labelled(array.dims, mean, f"share of draws: {name}")}
+            of_all = np.nansum(stack, axis=0) / len(self.rows)
+            told = labelled(array.dims, of_all, f"share of draws: {name}")
+            return self._share(name, stack) | {f"{name}_probability": told}
         if name == "period_number":
             every = np.append(stack, array.values)
             numbers = np.unique(every[np.isfinite(every)]).astype(array.dtype)
-            shares = np.stack([np.mean(stack == number, axis=0) for number in numbers])
+            shares = np.stack([np.sum(stack == number, axis=0) for number in numbers]) / len(self.rows)
             return self._share(name, stack) | {
                 "period_number_probability": labelled(
                     ("period_value", *array.dims), shares, "share of draws with this period number (0: none found)"

@@ -88,8 +88,10 @@ def propagate(
         where some draws have no value, ``x_share`` says how many have. Of a run these are values at its own instants:
         give ``duration=`` and ``samples=``, so that every draw has them. For period numbers
         ``period_number_probability`` over ``period_value`` (0: none found; a draw that diverged has no number), for
-        ``stable`` ``stable_probability``. Of a branch, at each of its points the values of drawn branches at the same
-        parameter, between the same folds (of a diagram of several branches only the special points). Attractors of a
+        ``stable`` ``stable_probability``, shares of all draws, those without a motion here included. Of a branch, at
+        each of its points the values of drawn branches at the same parameter, between the same folds (of a diagram of
+        several branches only the special points). Crossings of a run are those of draws in which they are the same
+        ones, ``crossing_time_share`` says how many. Attractors of a
         draw are those near which they lie (by the extremes of their motions). Jumps and special points are matched by
         kind and nearness:
         ``jump_value_draws`` and ``special_value_draws`` over ``draw``, their ``_quantiles`` and ``_share``. With
