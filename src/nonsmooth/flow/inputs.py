@@ -13,7 +13,7 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import shortened, unknown
-from nonsmooth.flow.engines.engine import Changes
+from nonsmooth.flow.engines.engine import Changes, State
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, float_array
@@ -236,6 +236,14 @@ class DelayedInputs:
         S[:, :n, n:] += self.moved(flow, times)[0][:, None, :] * late.transpose(0, 2, 1)
         S[:, own, n:] = self.by_delays(flow, after)[:, own]
         return S
+
+
+def under(course: DelayedInputs | None, state: State, begin: float, until: float) -> Changes | None:
+    """The changes of inputs between two instants, the state given those with which it begins; None without inputs."""
+    if course is None:
+        return None
+    state.u[course.first :] = course.at(begin)
+    return course.changes(begin, until)
 
 
 def driven(system: System, given: Any) -> Driven | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import warn_if_slow
-from nonsmooth.flow.inputs import DelayedInputs, driven
+from nonsmooth.flow.inputs import DelayedInputs, driven, under
 from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.saltation import Jump, OneOrderOnly
 from nonsmooth.flow.simulate import check_complete, run_length
@@ -31,11 +31,69 @@ CHANGE = -1  # of inputs, among transitions
 RTOL = 1e-15  # where the flow is not exact
 
 
+@dataclass(frozen=True, eq=False)
+class SampledRun:
+    """A run under inputs at its samples.
+
+    Attributes
+    ----------
+    time : array (N,)
+        The system's time.
+    z : array (N, n)
+        States and memory.
+    mode, segment : array (N,) of int
+        The mode, and how many transitions came before.
+    log : TrajectoryLog
+    begin : float
+    start : (int, array (n,))
+        Mode, states and memory at the beginning, before any transition.
+    course, changes
+        The inputs of the run, the instants at which they change, and the log's samples there.
+    D, rate, of_time : array
+        Those of its :class:`Variation`, where they were asked for.
+    """
+
+    time: FloatArray
+    z: FloatArray
+    mode: IntArray
+    segment: IntArray
+    log: TrajectoryLog
+    begin: float
+    start: tuple[int, FloatArray]
+    course: DelayedInputs | None
+    changes: tuple[FloatArray, IntArray]
+    D: FloatArray | None = None
+    rate: FloatArray | None = None
+    of_time: FloatArray | None = None
+
+
+def sampled(
+    engine: Engine,
+    tables: Any,
+    state: State,
+    begin: float,
+    times: FloatArray,
+    course: DelayedInputs | None = None,
+    most: float = np.inf,
+) -> SampledRun:
+    """March from a state at ``begin`` to the samples; given up beyond ``most`` steps for each."""
+    changes, instants, cuts = under(course, state, begin, times[-1]), times, np.zeros(0)
+    if changes is not None:
+        cuts, instants = changes.times, np.union1d(times, changes.times)
+    start = int(state.counters[0]), np.concatenate([state.u, state.memory])
+    # the start itself is a sample too: there the transitions that hold already have been taken
+    samples, most = np.append(begin, instants), most * len(instants)
+    log = engine.record(tables, state, times[-1], samples, changes=changes, most=most)
+    at = slice(1, None) if changes is None else 1 + np.searchsorted(instants, times)
+    z = np.hstack([held(log.sample_u), log.sample_memory])[at]
+    where = cuts, 1 + np.searchsorted(instants, cuts)
+    return SampledRun(times, z, log.sample_mode[at], log.sample_segment[at], log, begin, start, course, where)
+
+
 class Variation:
     """One run taken apart: its segments, which end at samples too, the jumps between them, and their products.
 
-    ``z`` (N, n): states at the ``samples`` (N,), with which the segments behind them begin; behind the last there is
-    none.
+    Segments behind samples begin with the states there; behind the last sample there is none.
 
     Attributes
     ----------
@@ -53,30 +111,19 @@ class Variation:
         of the whole run.
     """
 
-    def __init__(
-        self,
-        flow: VariationalFlow,
-        values: FloatArray,
-        log: TrajectoryLog,
-        start: tuple[int, FloatArray],
-        t_begin: float,
-        samples: FloatArray,
-        z: FloatArray,
-        course: DelayedInputs | None,
-        changes: tuple[FloatArray, IntArray],
-    ) -> None:
-        n, size = flow.n, flow.n + flow.n_active
+    def __init__(self, flow: VariationalFlow, values: FloatArray, run: SampledRun) -> None:
+        n, size, log, course = flow.n, flow.n + flow.n_active, run.log, run.course
         first = int(log.sample_mode[0]), np.concatenate([held(log.sample_u[0]), log.sample_memory[0]])
         flow.catch_up()
-        self.start = settled(flow, values, start, first, t_begin)
-        modes, starts, self.times, self.transitions, before = apart(flow, log, first, t_begin, changes)
+        self.start = settled(flow, values, run.start, first, run.begin)
+        modes, starts, self.times, self.transitions, before = apart(flow, log, first, run.begin, run.changes)
         # A sample at a crossing is the limit after it.
-        count, behind = len(self.times), np.searchsorted(self.times[1:], samples, "right")
+        count, behind = len(self.times), np.searchsorted(self.times[1:], run.time, "right")
         segment = np.concatenate([np.arange(count), behind])
         order = np.argsort(segment, kind="stable")
         is_sample = (order >= count)[1:]
-        t = np.concatenate([self.times, samples])[order]
-        begins, of_mode = np.vstack([*starts, z])[order], np.array(modes)[segment[order]]
+        t = np.concatenate([self.times, run.time])[order]
+        begins, of_mode = np.vstack([*starts, run.z])[order], np.array(modes)[segment[order]]
         legs = self.segments = flow.segments(values, of_mode[:-1], t[:-1], np.diff(t), begins[:-1])
         steps = np.zeros((len(is_sample), size, size))
         steps[:, :n, :n], steps[:, :n, n:] = legs.Phi, legs.P
@@ -259,18 +306,10 @@ def variation(
     SolveError
         The run could not be completed.
     """
-    engine = engine_for(system, rtol=RTOL)
-    values = system.parameter_vector()
-    changes = None
-    if course is not None:
-        state.u[course.first :] = course.at(0.0)
-        changes = course.changes(0.0, t_end)
-    start = int(state.counters[0]), np.concatenate([state.u, state.memory])
-    instants = np.zeros(1) if changes is None else np.append(0.0, changes.times)
-    log = engine.record(engine.prepare(values[None, :]), state, t_end, instants, changes=changes)
-    check_complete(log, system, state, system.period())
-    cuts, end = (instants[1:], np.arange(1, len(instants))), np.array([t_end])
-    return Variation(flow, values, log, start, 0.0, end, np.zeros((1, flow.n)), course, cuts), log
+    engine, values = engine_for(system, rtol=RTOL), system.parameter_vector()
+    run = sampled(engine, engine.prepare(values[None, :]), state, 0.0, np.array([t_end]), course)
+    check_complete(run.log, system, state, system.period())
+    return Variation(flow, values, run), run.log
 
 
 def order_matters(system: System, engine: Engine, values: FloatArray, state: State, duration: float) -> bool:

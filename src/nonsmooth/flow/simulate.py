@@ -13,7 +13,7 @@ from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, warn_if_slow, wrong_way
-from nonsmooth.flow.inputs import driven
+from nonsmooth.flow.inputs import driven, under
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, as_called, solver_of
 from nonsmooth.flow.starts import first_state, is_one_start
@@ -112,19 +112,15 @@ def simulate(
     instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period, width)
     state, drive = first_state(system, start, mode), driven(system, inputs)
     course = None if drive is None else drive.at(system.values)
-    if course is not None:
-        state.u[course.first :] = course.at(0.0)
+    changes = under(course, state, 0.0, t_begin or t_end)
     if not ramps:
         refuse_beyond_stops(system, state.u[None, :])
     engine = engine_for(system, **solver_of(options), step=step, traced=traced if ramps else None)
     begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
-        changes = None if course is None else course.changes(0.0, t_begin)
         check_complete(engine.record(tables, state, t_begin, np.empty(0), changes=changes), system, state, period)
-        if course is not None:
-            state.u[course.first :] = course.at(t_begin)
-    changes = None if course is None else course.changes(t_begin, t_end)
+        changes = under(course, state, t_begin, t_end)
     log = engine.record(tables, state, t_end, instants, changes=changes)
     check_complete(log, system, state, period)
     largest = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray, IntArray
-from nonsmooth.flow.engines.engine import State, TrajectoryLog
+from nonsmooth.arrays import FloatArray
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.inputs import DelayedInputs, Driven
-from nonsmooth.flow.sensitivity import Variation, held
+from nonsmooth.flow.inputs import Driven
+from nonsmooth.flow.sensitivity import SampledRun, Variation, sampled
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.system import System
@@ -21,40 +21,6 @@ from nonsmooth.system.system import System
 KEPT = 100_000  # samples of the motions that a marcher keeps
 STEPS = 1000  # between two readings: a motion that takes more is none that they tell of
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
-
-
-@dataclass(frozen=True, eq=False)
-class SampledMotion:
-    """States at the samples; with derivatives where they were asked for.
-
-    Attributes
-    ----------
-    time : array (N,)
-        The system's time: that of the record, and what the phase adds.
-    z : array (N, n)
-        States and memory.
-    mode, segment : array (N,) of int
-        The mode, and how many transitions came before.
-    log : TrajectoryLog
-    start : array (n,)
-        States and memory at the beginning.
-    course, changes
-        The inputs of the run, the instants at which they change, and the log's samples there.
-    rate : array (N, n), D : array (N, n, n + n_active), of_time : array (N, n)
-        dz/dt; derivatives in the start z and in the active parameters; in the time of the whole window.
-    """
-
-    time: FloatArray
-    z: FloatArray
-    mode: IntArray
-    segment: IntArray
-    log: TrajectoryLog
-    start: FloatArray
-    course: DelayedInputs | None
-    changes: tuple[FloatArray, IntArray]
-    rate: FloatArray | None = None
-    D: FloatArray | None = None
-    of_time: FloatArray | None = None
 
 
 class Marcher:
@@ -80,18 +46,17 @@ class Marcher:
         mode: int,
         derivatives: bool = False,
         drive: Driven | None = None,
-    ) -> SampledMotion | None:
+    ) -> SampledRun | None:
         """March from (begin, z, mode) to the samples; None where the run does not come to its end."""
         key, size = (values.tobytes(), begin, times.tobytes(), z.tobytes(), mode, drive), len(times)
         plain = self.once(key, size, lambda: self._marched(values, begin, times, z, mode, drive))
         if plain is None or not derivatives:
             return plain
 
-        def derived() -> SampledMotion | None:
+        def derived() -> SampledRun | None:
             """None where derivatives are not known: of a start at which several contacts are hit."""
-            start, places = (mode, plain.start), (plain.time, plain.z)
             try:
-                run = Variation(self.flow, values, plain.log, start, begin, *places, plain.course, plain.changes)
+                run = Variation(self.flow, values, plain)
             except ValueError:
                 return None
             return replace(plain, rate=run.rate, D=run.D, of_time=run.of_time)
@@ -107,30 +72,18 @@ class Marcher:
 
     def _marched(
         self, values: FloatArray, begin: float, times: FloatArray, z: FloatArray, mode: int, drive: Driven | None
-    ) -> SampledMotion | None:
+    ) -> SampledRun | None:
         period = self.system.period_at(values)
         n_u = len(self.traced.u)
         whole = 0.0 if period is None else float(np.floor(begin / period))
         state = State(z[:n_u].copy(), z[n_u:].copy())
         state.clock[:2] = (begin, 0.0) if period is None else (begin - whole * period, whole)
         state.counters[0] = mode
-        # the start itself is a sample too: there the transitions that hold already have been taken
         if self._tables[0] != values.tobytes():  # many windows at the same parameters
             self._tables = values.tobytes(), self.engine.prepare(values[None, :])
-        course, changes, instants = None, None, times
+        course = None
         if drive is not None:
             course = drive.at(dict(zip(self.traced.parameter_names, values.tolist(), strict=True)))
-            state.u[course.first :] = course.at(begin)
-            z, changes = np.concatenate([state.u, state.memory]), course.changes(begin, times[-1])
-            instants = np.union1d(times, changes.times)
-        samples, most = np.append(begin, instants), STEPS * len(instants)
-        log = self.engine.record(self._tables[1], state, times[-1], samples, changes=changes, most=most)
-        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-            return None
-        u = np.hstack([held(log.sample_u), log.sample_memory])
-        if not np.isfinite(u).all():
-            return None
-        at = slice(1, None) if changes is None else 1 + np.searchsorted(instants, times)
-        cuts = np.zeros(0) if changes is None else changes.times
-        where = cuts, 1 + np.searchsorted(instants, cuts)
-        return SampledMotion(times, u[at], log.sample_mode[at], log.sample_segment[at], log, z.copy(), course, where)
+        run = sampled(self.engine, self._tables[1], state, begin, times, course, STEPS)
+        good = run.log.status in (codes.OK, codes.NOT_GUARANTEED) and np.isfinite(run.z).all()
+        return run if good else None

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import IntArray
+from nonsmooth.flow.sensitivity import SampledRun
 from nonsmooth.identification.fit.growth import Grown
-from nonsmooth.identification.fit.motion import SampledMotion
 from nonsmooth.results.labels import labels_of
 from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.system import System
@@ -157,7 +157,7 @@ def _places(system: System) -> tuple[list[str], dict[tuple[str, int], int]]:
     return names, marks
 
 
-def _of_samples(system: System, motion: SampledMotion, marks: Mapping[tuple[str, int], int]) -> IntArray:
+def _of_samples(system: System, motion: SampledRun, marks: Mapping[tuple[str, int], int]) -> IntArray:
     """The place of each sample of a motion: the nearest transition, a graze, else its mode."""
     found = np.array([marks["mode", int(m)] for m in motion.mode], np.int64)
     if len(motion.time) < 2:

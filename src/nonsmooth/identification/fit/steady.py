@@ -29,7 +29,8 @@ from nonsmooth.system.system import System
 
 KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
 if TYPE_CHECKING:
-    from nonsmooth.identification.fit.motion import Marcher, SampledMotion
+    from nonsmooth.flow.sensitivity import SampledRun
+    from nonsmooth.identification.fit.motion import Marcher
 
 TRANSIENT = 300
 ROUNDING = 1e-13  # of the largest reading: none has less noise
@@ -318,7 +319,7 @@ def _slopes(
     return 0.5 * (ends[:, 0] - ends[:, 1])[None]
 
 
-def _extreme(motion: SampledMotion, k: int, sign: float) -> float:
+def _extreme(motion: SampledRun, k: int, sign: float) -> float:
     """The instant of the largest (sign 1) or least (-1) value of a state: between samples where it is smooth there."""
     y, t = sign * motion.z[:, k], motion.time
     i = 1 + np.argmax(y[1:-1])

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.flow.sensitivity import SampledRun
 from nonsmooth.identification.arrow import Residuals
-from nonsmooth.identification.fit.motion import Marcher, SampledMotion
+from nonsmooth.identification.fit.motion import Marcher
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Observable, Sensor, Unknowns
 from nonsmooth.identification.fit.steady import SteadyReadings, predicted
@@ -192,7 +193,7 @@ class Windows:
 
     def motion(
         self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False
-    ) -> SampledMotion | None:
+    ) -> SampledRun | None:
         """The motion of a window at its samples; where delays differ, at the instants of each quantity in turn."""
         instants = self.instants(theta, window)
         return self.march(theta, window.record, window.begin, instants, start, window.mode, derivatives)
@@ -206,7 +207,7 @@ class Windows:
         start: FloatArray,
         mode: int,
         derivatives: bool = False,
-    ) -> SampledMotion | None:
+    ) -> SampledRun | None:
         """A motion from an instant of a run to times of its corrected clock; None where it does not come to its end."""
         values, _, clock, phase = self.at(theta, run)
         begin *= clock
@@ -225,7 +226,7 @@ class Windows:
         return time - delays[0] if (delays == delays[0]).all() else np.unique(time[:, None] - np.unique(delays))
 
     def readings(
-        self, theta: FloatArray, window: Window, motion: SampledMotion, slopes: bool
+        self, theta: FloatArray, window: Window, motion: SampledRun, slopes: bool
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted readings (R,), and their derivatives (R, unknowns of the window + n) where asked for."""
         values, sensors, clock, phase = self.at(theta, window.record)
