@@ -77,13 +77,13 @@ class Eliminated(NamedTuple):
 
 
 def reduced(
-    problem: Windows, state: Residuals, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
+    problem: Windows, state: Residuals, weights: list[FloatArray] | None = None, used: Any = None, damping: float = 0.0
 ) -> tuple[Any, ...]:
     """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
 
     By an orthogonal factorization of each piece: squares of a chaotic motion's derivatives lose all digits.
     """
-    J = state.of_alone.reshape(-1, p)
+    J, weights = state.of_alone.reshape(-1, len(problem.unknowns.precision)), weights or problem.weights(state)
     normal, right = J.T @ J, J.T @ state.alone[: len(J)]
     back = []
     for i, piece in enumerate(problem.pieces):
@@ -149,7 +149,7 @@ def settle(
     def step_of(damping: float = 0.0) -> tuple[FloatArray, FloatArray, list[Eliminated]]:
         """A step of the parameters, those at a bound against which the data push them being held; their covariance, and
         what gives the starts' steps."""
-        normal, right, back = reduced(problem, state, weights, len(theta), used, damping)
+        normal, right, back = reduced(problem, state, weights, used, damping)
         full, pull = normal + prior, right - prior @ (theta - u.centre)
         if not np.isfinite(full).all():
             raise SolveError(
@@ -220,7 +220,7 @@ def sandwich(problem: Windows, theta: FloatArray, starts: FloatArray) -> Sandwic
     p, prior = len(theta), problem.unknowns.precision
     state = problem.residuals(theta, starts, True)
     weights = problem.weights(state)
-    normal, _, back = reduced(problem, state, weights, p)
+    normal, _, back = reduced(problem, state, weights)
     J, tau, rows = state.of_alone.reshape(-1, p), [1.0] * (not problem.pieces), len(state.alone)
     alone = J.T @ J * max(1.0, float(state.alone @ state.alone) / max(rows - p, 1))  # independent, of the noise given
     meat = np.zeros((p, p))

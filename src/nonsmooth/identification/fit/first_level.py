@@ -48,6 +48,11 @@ class Stage:
         """The residuals there."""
         return self.problem.residuals(self.theta, self.starts) if self.given is None else self.given
 
+    @property
+    def chi2(self) -> float:
+        """Sum of the weighted squares there, those of the starts among them."""
+        return self.state.chi2(self.problem.weights(self.state))
+
     @cached_property
     def misfits(self) -> FloatArray:
         """Mean squared residual over the noise, of each window."""
@@ -79,7 +84,7 @@ def level(stage: Stage, used: Any = None) -> Stage:
 def foreseen(problem: Windows, theta: FloatArray, starts: FloatArray) -> float:
     """The sum of squared residuals over the noise to which derivatives lead from here, all starts free."""
     state, known = problem.residuals(theta, starts, True), _known(problem)
-    normal, right, back = reduced(problem, state, problem.weights(state), len(theta))
+    normal, right, back = reduced(problem, state)
     if not np.isfinite(normal).all():
         return 0.0
     step, found = inverted(normal + known)[0] @ (right - known @ (theta - problem.unknowns.centre)), 0.0

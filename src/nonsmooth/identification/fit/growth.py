@@ -26,7 +26,7 @@ from nonsmooth.identification.fit.first_level import (
     settle_first,
 )
 from nonsmooth.identification.fit.first_windows import first_windows
-from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
+from nonsmooth.identification.fit.noise import colours, residuals_of, robust_size, strange
 from nonsmooth.identification.fit.steady import ROUNDING
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.recordings.signals.spectrum import correlation_times
@@ -82,7 +82,7 @@ class Grown(Stage):
     @property
     def readings(self) -> int:
         """Number of readings that were used."""
-        return sum(len(window.readings[0]) for window in self.problem.pieces)
+        return int(self.problem.counts.sum())
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -101,7 +101,7 @@ class Grown(Stage):
 
     def loose(self, state: Residuals) -> FloatArray:
         """Directions of the unknowns that readings and priors leave open; the starts' own wide prior tells nothing."""
-        read, *_ = reduced(self.problem, state, self.problem.weights(state, starts=False), len(self.theta))
+        read, *_ = reduced(self.problem, state, self.problem.weights(state, starts=False))
         return inverted(read + self.problem.unknowns.precision)[1]
 
     @property
@@ -112,8 +112,7 @@ class Grown(Stage):
     @property
     def _unlikely(self) -> float:
         """Minus the logarithm of the likelihood, for each reading."""
-        counts = np.array([len(window.readings[0]) for window in self.problem.pieces])
-        of = np.concatenate([window.readings[1] for window in self.problem.pieces])
+        counts, of = self.problem.counts, np.concatenate([window.readings[1] for window in self.problem.pieces])
         own = self.problem.noise * np.sqrt(1.0 - self.problem.colour**2)
         return float(np.mean(np.log(own[of])) + 0.5 * self.misfits @ counts / counts.sum())
 
@@ -200,7 +199,7 @@ def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free
     stage = Stage(now, theta, now.starts)
     for c in range(len(problem.sensors)):
         size = np.nanstd(np.concatenate([record.values[:, c] for record in problem.records]))
-        if not np.sqrt(np.mean(np.concatenate(parts(now, stage.state, c)) ** 2)) < _NEAR * size:
+        if not np.sqrt(np.mean(residuals_of(now, stage.state, c) ** 2)) < _NEAR * size:
             return None
     try:
         found = level(stage)
@@ -236,7 +235,7 @@ def _opened(whole: Grown, length: float, start: FloatArray | None, free: bool) -
         opened = level(stage)
     except SolveError:
         return None
-    residuals = [np.concatenate(parts(now, opened.state, c)) for c in range(len(now.sensors))]
+    residuals = [residuals_of(now, opened.state, c) for c in range(len(now.sensors))]
     if not np.isfinite(np.concatenate(residuals)).all():
         return None
     return opened if chance(_reduced(opened), max(map(correlation_times, residuals))) < _CHANCE else None
@@ -288,14 +287,12 @@ def _joined(stage: Stage, length: float) -> list[Window]:
 
 def _reduced(stage: Stage) -> float:
     """Sum of squared residuals over the noise, per degree of freedom."""
-    counts = [len(window.readings[0]) for window in stage.problem.pieces]
-    return float(stage.misfits @ counts) / _freedom(stage.problem)[0]
+    return float(stage.misfits @ stage.problem.counts) / _freedom(stage.problem)[0]
 
 
 def _freedom(problem: Windows) -> tuple[float, int]:
     """Degrees of freedom of the readings, a tenth of these at least, and the number of readings."""
-    free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
-    total = sum(len(w.readings[0]) for w in problem.pieces)
+    free, total = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names), int(problem.counts.sum())
     return max(total - free, 0.1 * total), total
 
 
@@ -334,7 +331,7 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
     """The fit with each record in the mode in which it fits best from its beginning, all unknowns free."""
     begins = []
     for i in range(len(final.problem.pieces)):
-        now, best = final.state.chi2(final.problem.weights(final.state)), None
+        now, best = final.chi2, None
         others = other_beginnings(final, i)
         if not others:
             continue
@@ -344,8 +341,8 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
                 found = level(final.with_others({i: (window, start)}))
             except SolveError:
                 continue
-            if (far := found.state.chi2(final.problem.weights(found.state))) < least:
-                least, best = far, found
+            if found.chi2 < least:
+                least, best = found.chi2, found
         if best is not None and least < now - BETTER:
             final, mode = _final(best, irregular, rounds), best.problem.pieces[i].mode
         begins.append((final.problem.pieces[i].record, mode, abs(least - now)))
@@ -358,7 +355,7 @@ def _noise(problem: Windows, state: Residuals) -> FloatArray:
     grow = total / max(freedom, 1e-9)
     found = np.empty(len(problem.sensors))
     for c, sensor in enumerate(problem.sensors.values()):
-        r = np.concatenate([np.zeros(0), *parts(problem, state, c)])
+        r = residuals_of(problem, state, c)
         if sensor.noise is not None:
             found[c] = np.hypot(sensor.noise, sensor.floor)
         else:

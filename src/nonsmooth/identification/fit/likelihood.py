@@ -147,7 +147,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
 
     rng = np.random.default_rng(seed)
     walkers = 2 * size + 2
-    begin = _drawn(grown, weights, at, walkers, rng)
+    begin = _drawn(grown, at, walkers, rng)
     sampler = emcee.EnsembleSampler(walkers, size, log_density)
     generator = np.random.RandomState(int(rng.integers(2**32)))  # of the kind that emcee takes
     first = emcee.State(begin, random_state=generator.get_state())
@@ -177,12 +177,12 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
 
 
 def _drawn(
-    grown: Grown, weights: list[FloatArray], at: list[tuple[int, int]], count: int, rng: np.random.Generator
+    grown: Grown, at: list[tuple[int, int]], count: int, rng: np.random.Generator
 ) -> FloatArray:
     """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
     state = problem.residuals(grown.theta, grown.starts, True)
-    normal, _, back = reduced(problem, state, weights, p)
+    normal, _, back = reduced(problem, state)
     covariance = inverted(normal + u.precision)[0]
     if (loose := grown.loose(state)).size:
         names = ", ".join(u.names[i] for i in np.flatnonzero(concerned(loose).any(axis=1)))
@@ -224,7 +224,7 @@ def _beside(grown: Grown) -> list[tuple[float, int, FloatArray]]:
     problem, theta, u = grown.problem, grown.theta, grown.problem.unknowns
     state = problem.residuals(theta, grown.starts, True)
     weights = problem.weights(state)
-    covariance = inverted(reduced(problem, state, weights, len(theta))[0] + u.precision)[0]
+    covariance = inverted(reduced(problem, state)[0] + u.precision)[0]
     least, found = problem.cost(theta, grown.starts, weights), []
     here = _transitions(problem, theta, grown.starts)
     for i, error in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):

@@ -36,13 +36,13 @@ def _colour(problem: Windows, c: int, rows: list[tuple[FloatArray, FloatArray]])
     """The most likely correlation, where it is large and sure enough; ``rows``: times and residuals."""
     from scipy.optimize import minimize_scalar
 
-    every = np.concatenate([np.zeros(0), *(r for _, r in rows)])
+    every = _joined(rows)
     cut = 5.0 * robust_size(every)
     cuts = [(problem.gaps(c, t), np.clip(r, -cut, cut)) for t, r in rows if len(r) > 1]
     if not cuts or not every.any():
         return 0.0
     gaps, before, here = (np.concatenate(one) for one in zip(*((gap, r[:-1], r[1:]) for gap, r in cuts), strict=True))
-    power = max(np.mean(np.clip(every, -cut, cut) ** 2), 1e-300)
+    power = max(float(np.mean(np.clip(every, -cut, cut) ** 2)), 1e-300)
 
     def unlikely(rho: float) -> float:
         """Minus twice the logarithm of the likelihood."""
@@ -62,7 +62,7 @@ def strange(problem: Windows, plain: Residuals, white: Residuals, irregular: Flo
     """
     worst, missing = 0.0, False
     for c in range(len(problem.sensors)):
-        r, e = (np.concatenate([np.zeros(0), *parts(problem, one, c)]) for one in (plain, white))
+        r, e = (residuals_of(problem, one, c) for one in (plain, white))
         if len(r) < 16:
             continue
         # outliers raise the one, readings that are rounded the other
@@ -75,13 +75,17 @@ def strange(problem: Windows, plain: Residuals, white: Residuals, irregular: Flo
     return worst, missing
 
 
-def parts(problem: Windows, state: Residuals, c: int) -> list[FloatArray]:
-    """Residuals of a quantity, window by window, without the readings at a limit of the sensor."""
-    return [r for _, r in _timed(problem, state, c)]
+def residuals_of(problem: Windows, state: Residuals, c: int) -> FloatArray:
+    """Residuals of a quantity, without the readings at a limit of the sensor."""
+    return _joined(_timed(problem, state, c))
+
+
+def _joined(rows: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    return np.concatenate([np.zeros(0), *(r for _, r in rows)])
 
 
 def _timed(problem: Windows, state: Residuals, c: int) -> list[tuple[FloatArray, FloatArray]]:
-    """The same with their times."""
+    """The same with their times, window by window."""
     mine = [(w, r, (w.readings[1] == c) & (problem.limits(w) == 0)) for w, r in problem.rows(state)]
     return [(w.time[w.readings[0][here]], r[here]) for w, r, here in mine]
 

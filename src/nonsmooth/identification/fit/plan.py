@@ -180,7 +180,7 @@ def _information(
             raise refusal
         window.values[window.readings] = whole.shown(window, whole.readings(theta, window, course, False)[0])
     state = whole.residuals(theta, whole.starts, True)
-    normal = reduced(whole, state, whole.weights(None, starts=False), len(theta))[0]
+    normal = reduced(whole, state, whole.weights(None, starts=False))[0]
     shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]

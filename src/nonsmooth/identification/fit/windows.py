@@ -153,6 +153,11 @@ class Windows:
         return np.maximum(np.diff(time) / self.step[c], 0.2)
 
     @cached_property
+    def counts(self) -> NDArray[np.intp]:
+        """Number of readings of each window."""
+        return np.array([len(window.readings[0]) for window in self.pieces], np.intp)
+
+    @cached_property
     def readouts(self) -> list[Observable]:
         return [Observable(self.system, name, self.marcher.flow.places) for name in self.sensors]
 
@@ -311,7 +316,7 @@ class Windows:
 
     def rows(self, state: Residuals) -> list[tuple[Window, FloatArray]]:
         """The windows with the residuals of their readings."""
-        return [(w, r[: len(w.readings[0])]) for w, r in zip(self.pieces, state.residuals, strict=True)]
+        return [(w, r[:n]) for w, n, r in zip(self.pieces, self.counts, state.residuals, strict=True)]
 
     def cost(self, theta: FloatArray, starts: FloatArray, weights: list[FloatArray] | None = None) -> float:
         """Sum of squares, priors included."""
