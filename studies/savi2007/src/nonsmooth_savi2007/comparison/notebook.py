@@ -2,7 +2,7 @@ r"""From a notebook's settings to the model's parameters, for rigs with a crank:
 
 The crank of length a moves the end of one spring by :math:`a \cos\varphi`: to first order the force is
 :math:`\rho = k a`. The model's x and g count from the car's mean position under the drive, the screw's reading and the
-sensor's count from elsewhere: both are referred (:mod:`nonsmooth_savi2007.comparison.notebook`).
+sensor's count from elsewhere: both are referred.
 
 Three places are told apart. The rig's position counts from where the *sensor was zeroed*; the car *rests* where its
 springs balance, and a car with dry friction stops, and is zeroed, anywhere within :math:`F_C/2k` of it; under the drive

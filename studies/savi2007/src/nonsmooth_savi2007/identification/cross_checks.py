@@ -1,8 +1,8 @@
 r"""Agreement of measurements: of repeated ones, and between findings of two procedures that tell one quantity.
 
 Each is a difference over its standard uncertainty. What both share, a mass that is weighed once, is not in it: it
-moves both alike. A difference that chance does not explain
-(``consistency.CHANCE``) is said in a sentence of its own, with where to look.
+moves both alike. A difference that chance does not explain (`CHANCE`) is said in a sentence of its own, with where to
+look.
 
 Each run tells the same quantities :math:`\theta_i` with its own covariance :math:`C_i`. About their weighted mean
 
