@@ -87,9 +87,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
     nothing = AmplitudeJump(np.nan)
     for word in dict.fromkeys([*measured, *theory]):
         both = seen, expected = list(measured.get(word, ())), list(theory.get(word, ()))
-        # Jumps as an experimenter read them off do not say whether the amplitude rose.
-        alike = any(np.isnan(jump.after) for jump in seen)
-        kinds = ([alike or jump.after > jump.before for jump in jumps] for jumps in both)
+        kinds = ([jump.after > jump.before for jump in jumps] for jumps in both)
         pairs = nearest_alike(*([jump.value for jump in jumps] for jumps in both), *kinds)
         rows += [(word, jump, expected[pairs[i]] if i in pairs else nothing) for i, jump in enumerate(seen)]
         rows += [(word, nothing, jump) for j, jump in enumerate(expected) if j not in pairs.values()]
@@ -177,7 +175,7 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str) -> dict[s
         "direction": labelled("direction", np.array(directions), "direction of the sweep"),
     }
     expected = _jumps(values, curves, directions)
-    seen = _measured_jumps(measured, runs, directions)
+    seen = jumps_of_runs(*(runs[key] for key in ("value", "amplitude", "error", "direction")))
     drawn_jumps: list[Jumps] = []
     if model.system is not None and model.draws:
         systems, drawn = model.drawn()
@@ -237,21 +235,6 @@ def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jum
         steps = [(x[[i, j]], heights[[i, j]].tolist()) for i, j in jumps_in(x, heights)]
         found[word] = [AmplitudeJump(at.mean(), np.ptp(at), *both) for at, both in steps]
     return found
-
-
-def _measured_jumps(measured: xr.Dataset, runs: dict[str, NDArray[Any]], directions: list[str]) -> Jumps:
-    """The jumps that the measurement states, else those in its steps; the prediction has no say in it."""
-    stated = "jump_value" in measured and "jump_before" not in measured  # as the experimenter read them off
-    if stated and "run" in measured["amplitude"].dims:
-        found: dict[str, list[AmplitudeJump]] = {}
-        words = measured["jump_direction"].values.astype(str)
-        steps = measured["jump_step"].values if "jump_step" in measured else np.zeros(len(words))
-        for word in directions:
-            rows = zip(measured["jump_value"].values, steps, words, strict=True)
-            named = [AmplitudeJump(value, step) for value, step, w in rows if w == word]
-            found[word] = sorted(named, reverse=word == "down")
-        return found
-    return jumps_of_runs(*(runs[key] for key in ("value", "amplitude", "error", "direction")))
 
 
 _OF_A_DIAGRAM = 201
