@@ -24,6 +24,7 @@ GOES_ON = 2  # of BEGUN: behind an earlier run; what holds at that very instant 
 RETURNS, PASSES, TRIES = 4, 5, 6  # of the section; steps since the last pass
 SAMPLES, CROSSINGS, TOUCHES = 7, 8, 9  # logged
 FIRED = 10  # the functional (indicator) that has crossed, or -1
+ANOTHER = -2  # in its place, of a transition at the instant of another one or of a start
 # a transition (plus one) that waits for the tables of its mode, and of its instant: the transitions taken before it,
 # the mode before the first, the first; whether they are closely behind others, and what the observer saw on the leg
 WAITS, TAKEN, SOURCE, FIRST, CLOSELY, NOTED = 11, 12, 13, 14, 15, 16

@@ -15,6 +15,7 @@ whoever calls says where it leads, and the next call goes on with it.
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import (
     ALONE,
+    ANOTHER,
     ASKS_BEHIND,
     BEGUN,
     BEYOND_STOP,
@@ -109,7 +110,7 @@ def settle(i, form, net, tables, work):
             if again:  # modes that lead back to each other at once
                 return CHATTER
             break
-        tally[MODE] = take(i, t, -1, form, tables, net, work)
+        tally[MODE] = take(i, t, ANOTHER, form, tables, net, work)
         tally[TAKEN] += 1
         if net.transitions[t, 2] >= DEAD_END:
             return NOT_UNIQUE + net.transitions[t, 2] - DEAD_END
@@ -200,7 +201,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             tally[WAITS], tally[TAKEN], tally[CLOSELY] = t + 1, jumps, 1 if short else 0
             tally[CONCERNS] = concerns
             return PAUSED, 0
-        mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
+        mode = take(i, t, fired if jumps == 0 else ANOTHER, form, tables, net, work)
         cross(i, t, jumps, mode, form, net, section, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1

@@ -3,7 +3,7 @@
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.codes import LONGEST_STEP, MODE, TIME
+from nonsmooth.kernels.hybrid.codes import ANOTHER, LONGEST_STEP, MODE, TIME
 from nonsmooth.kernels.linear.sums import at, dot
 from nonsmooth.kernels.linear.tables import STATES, sizes_at, states_of, width_of
 from nonsmooth.kernels.linear.values import EPS, noise, rounding, slope_of, value_of
@@ -51,9 +51,11 @@ def vanishing(tables, mode, f, w):
 def mark_zeros(tables, work, mode, fired):
     """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
 
-    The value of ``fired`` does (-1: of none is that known). Two where a stick ends, three where a contact lifts off:
-    what is rounding there must not decide. At a crossing w carries the rounding of the step that led there: it decides
-    where an indicator has no constant part, such as that of a stop at x = 0."""
+    The value of ``fired`` does, behind ``ANOTHER`` transition of the instant that of all that were zero there, unless
+    it has moved from ``work.wp``, as behind a reset, or is another quantity here. How large rounding is depends on the
+    mode: by that alone two modes could send the motion back and forth. Two where a stick ends, three where a contact
+    lifts off: what is rounding there must not decide. At a crossing w carries the rounding of the step that led there:
+    it decides where an indicator has no constant part, such as that of a stop at x = 0."""
     n, m = states_of(tables.field), width_of(tables.field)
     w, zero, fun, memo, sizes = work.w, work.zero, tables.fun, work.memo, sizes_at(n, m)
     step = max(memo[LONGEST_STEP], tables.info[mode, 0])
@@ -63,13 +65,14 @@ def mark_zeros(tables, work, mode, fired):
         largest = max(largest, fabs(w[r]))
     most = 17.0 * EPS * largest  # noise is below this with every state as large as the largest
     for f in range(zero.shape[0]):
-        zero[f] = 1 if f == fired else 0
-        if zero[f] == 0 and fun[mode, f, sizes] >= 0.0:  # else it is not asked for in this mode
+        known, found = f == fired or (fired == ANOTHER and zero[f] != 0), False
+        if known or fun[mode, f, sizes] >= 0.0:  # else it is not asked for in this mode
             value = fabs(value_of(tables, mode, f, w))
-            if value <= most * (fun[mode, f, sizes] + 0.25 * step * fun[mode, f, sizes + 1]):
-                if value <= noise(tables, mode, f, step, w):
-                    zero[f] = 1
-        if zero[f] != 0 and flat(tables, mode, f, w, work):
+            found = known and value <= 2.0 * fabs(value_of(tables, work.tally[MODE], f, work.wp))
+            if not found and value <= most * (fun[mode, f, sizes] + 0.25 * step * fun[mode, f, sizes + 1]):
+                found = value <= noise(tables, mode, f, step, w)
+        zero[f] = 1 if found else 0
+        if found and flat(tables, mode, f, w, work):
             zero[f], _ = vanishing(tables, mode, f, w)
 
 
@@ -175,16 +178,11 @@ def apply_map(i, t, form, net, tables, work):
 def take(i, t, fired, form, tables, net, work):
     """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
 
-    What has crossed is zero, also behind a reset that leaves it where it was; not in a mode where it is another
-    quantity. ``work.wp`` keeps w just before."""
+    ``work.wp`` keeps w just before."""
     w, wp = work.w, work.wp
     for j in range(width_of(tables.field)):
         wp[j] = w[j]
-    mode, changes = net.transitions[t, 0], net.transitions[t, 1] != 0
-    off = fabs(value_of(tables, mode if changes else work.tally[MODE], fired, w)) if fired >= 0 else 0.0
-    if changes:
+    if net.transitions[t, 1] != 0:
         apply_map(i, t, form, net, tables, work)
-    if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
-        fired = -1
-    mark_zeros(tables, work, mode, fired)
-    return mode
+    mark_zeros(tables, work, net.transitions[t, 0], fired)
+    return net.transitions[t, 0]
