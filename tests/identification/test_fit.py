@@ -477,7 +477,7 @@ def test_a_trial_that_begins_with_an_impact_has_no_derivatives_and_ends_no_fit()
     mode = mass.modes.index("rub_forward_stop_open") if "rub_forward_stop_open" in mass.modes else 0
     found = marcher.run(mass.parameter_vector(), 0.0, times, start, mode)
     assert found.z[-1] == pytest.approx([0.5 - 0.5 + 0.05, -0.4], abs=1e-12)
-    assert marcher.run(mass.parameter_vector(), 0.0, times, start, mode, derivatives=True) is None
+    assert marcher.differentiated(mass.parameter_vector(), found) is None
 
 
 def test_a_trial_far_faster_than_its_readings_is_given_up():
@@ -495,7 +495,8 @@ def test_a_sample_where_an_input_changes_is_the_limit_behind_it():
     )
     drive = driven(cart, {"force": ns.Input([0, 1], [0.0, 3.0], between="steps", delay="late")})
     marcher, times = Marcher(cart, ("late",)), np.array([0.5, 1.0, 1.5])
-    motion = marcher.run(cart.parameter_vector(), 0.0, times, np.zeros(4), 0, derivatives=True, drive=drive)
+    values = cart.parameter_vector()
+    motion = marcher.differentiated(values, marcher.run(values, 0.0, times, np.zeros(4), 0, drive=drive))
     np.testing.assert_allclose(motion.z[:, :2], [[0, 0], [0, 0], [0.375, 1.5]], atol=1e-14)
     np.testing.assert_allclose(motion.D[:, :2, -1], [[0, 0], [0, -3], [-1.5, -3]], atol=1e-14)
 

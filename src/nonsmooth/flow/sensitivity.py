@@ -49,6 +49,8 @@ class SampledRun:
         Mode, states and memory at the beginning, before any transition.
     course, changes
         The inputs of the run, the instants at which they change, and the log's samples there.
+    moved : array (N,) of int, or 0
+        By how many segments a sample stands beside the one in whose time it lies.
     D, rate, of_time : array
         Those of its :class:`Variation`, where they were asked for.
     """
@@ -62,6 +64,7 @@ class SampledRun:
     start: tuple[int, FloatArray]
     course: DelayedInputs | None
     changes: tuple[FloatArray, IntArray]
+    moved: IntArray | int = 0
     D: FloatArray | None = None
     rate: FloatArray | None = None
     of_time: FloatArray | None = None
@@ -116,14 +119,16 @@ class Variation:
         first = int(log.sample_mode[0]), np.concatenate([held(log.sample_u[0]), log.sample_memory[0]])
         flow.catch_up()
         self.start = settled(flow, values, run.start, first, run.begin)
-        modes, starts, self.times, self.transitions, before = apart(flow, log, first, run.begin, run.changes)
-        # A sample at a crossing is the limit after it.
-        count, behind = len(self.times), np.searchsorted(self.times[1:], run.time, "right")
+        modes, starts, times, transitions, before = apart(flow, log, first, run.begin, run.changes)
+        # A sample at a crossing is the limit after it; segments behind the last sample's are left out.
+        behind = np.searchsorted(times[1:], run.time, "right") + run.moved
+        count = int(behind.max()) + 1
+        self.times, self.transitions = times[:count], transitions[: count - 1]
         segment = np.concatenate([np.arange(count), behind])
         order = np.argsort(segment, kind="stable")
-        is_sample = (order >= count)[1:]
+        is_sample, back = (order >= count)[1:], np.argsort(order[order >= count])
         t = np.concatenate([self.times, run.time])[order]
-        begins, of_mode = np.vstack([*starts, run.z])[order], np.array(modes)[segment[order]]
+        begins, of_mode = np.vstack([*starts[:count], run.z])[order], np.array(modes)[segment[order]]
         legs = self.segments = flow.segments(values, of_mode[:-1], t[:-1], np.diff(t), begins[:-1])
         steps = np.zeros((len(is_sample), size, size))
         steps[:, :n, :n], steps[:, :n, n:] = legs.Phi, legs.P
@@ -139,7 +144,7 @@ class Variation:
         products = np.empty_like(steps)
         for step, product in zip(steps, products, strict=True):
             total = step.dot(total, out=product)  # of small matrices three times as quick as @
-        self.D, self.rate = products[is_sample, :n], legs.f_end[is_sample]
+        self.D, self.rate = products[is_sample, :n][back], legs.f_end[is_sample][back]
         self.of_time = self.rate - self.D[:, :, :n] @ legs.f_begin[0]
         if self.start is not None:  # transitions that are taken at once, whenever the run begins
             self.of_time += self.D[:, :, :n] @ self.start.R_t

@@ -68,8 +68,10 @@ def fit(
 
     is minimized over the parameters p, the start z_0 of every window, and what is unknown of the sensors (gain g,
     offset o, delay d). The derivatives of the motion are exact, through every transition, as those of
-    :func:`nonsmooth.sensitivity`. The windows grow from a part of a period to the whole record, as far as the motion
-    can be followed; from a first guess that is near, the longest are taken at once.
+    :func:`nonsmooth.sensitivity`. A reading that jumps at a transition (a speed at an impact, a state that is reset)
+    tells its side: no farther than its step from there it is compared with the side that it fits. The windows grow from
+    a part of a period to the whole record, as far as the motion can be followed; from a first guess that is near, the
+    longest are taken at once.
 
     Parameters
     ----------

@@ -176,9 +176,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
     return Finding("posterior", estimate, SAMPLED, grown.readings, grown.runs, tuple(notes), dict(others), data=data)
 
 
-def _drawn(
-    grown: Grown, at: list[tuple[int, int]], count: int, rng: np.random.Generator
-) -> FloatArray:
+def _drawn(grown: Grown, at: list[tuple[int, int]], count: int, rng: np.random.Generator) -> FloatArray:
     """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
     state = problem.residuals(grown.theta, grown.starts, True)
@@ -242,7 +240,7 @@ def _beside(grown: Grown) -> list[tuple[float, int, FloatArray]]:
 
 def _transitions(problem: Windows, theta: FloatArray, starts: FloatArray) -> list[list[int] | None]:
     """The transitions of each window's motion; None where it does not come to its end."""
-    motions = [problem.motion(theta, window, start) for window, start in zip(problem.pieces, starts, strict=True)]
+    motions = [problem.marched(theta, window, start) for window, start in zip(problem.pieces, starts, strict=True)]
     return [None if one is None else one.log.crossing_transition.tolist() for one in motions]
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.inputs import Driven
-from nonsmooth.flow.sensitivity import SampledRun, Variation, sampled
+from nonsmooth.flow.sensitivity import SampledRun, Variation, held, sampled
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.system import System
@@ -21,6 +21,20 @@ from nonsmooth.system.system import System
 KEPT = 100_000  # samples of the motions that a marcher keeps
 STEPS = 1000  # between two readings: a motion that takes more is none that they tell of
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
+
+
+class OtherSide(NamedTuple):
+    """Samples (K,) on the other side of a transition: which, by how many segments moved, the transition's time, and
+    the modes and states there."""
+
+    at: IntArray
+    moved: IntArray
+    time: FloatArray
+    mode: IntArray
+    z: FloatArray
+
+
+Sides = tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray]]  # states and modes before and after transitions
 
 
 class Marcher:
@@ -44,24 +58,57 @@ class Marcher:
         times: FloatArray,
         z: FloatArray,
         mode: int,
-        derivatives: bool = False,
         drive: Driven | None = None,
     ) -> SampledRun | None:
         """March from (begin, z, mode) to the samples; None where the run does not come to its end."""
-        key, size = (values.tobytes(), begin, times.tobytes(), z.tobytes(), mode, drive), len(times)
-        plain = self.once(key, size, lambda: self._marched(values, begin, times, z, mode, drive))
-        if plain is None or not derivatives:
-            return plain
+        key = values.tobytes(), begin, times.tobytes(), z.tobytes(), mode, drive
+        return self.once(key, len(times), lambda: self._marched(values, begin, times, z, mode, drive))
+
+    def differentiated(self, values: FloatArray, motion: SampledRun) -> SampledRun | None:
+        """The motion with its derivatives; None where they are not known: of a start at which several contacts are
+        hit."""
 
         def derived() -> SampledRun | None:
-            """None where derivatives are not known: of a start at which several contacts are hit."""
             try:
-                run = Variation(self.flow, values, plain)
+                run = Variation(self.flow, values, motion)
             except ValueError:
                 return None
-            return replace(plain, rate=run.rate, D=run.D, of_time=run.of_time)
+            return replace(motion, rate=run.rate, D=run.D, of_time=run.of_time)
 
-        return self.once((*key, True), size, derived)
+        return self.once((id(motion.log), np.asarray(motion.moved).tobytes()), len(motion.time), derived)
+
+    def beside(
+        self, values: FloatArray, motion: SampledRun, reach: float, jumps: Callable[[FloatArray, Sides], BoolArray]
+    ) -> OtherSide | None:
+        """The samples no farther than ``reach`` from a transition, as they are where it is taken later, or has been
+        taken before; of those transitions only that ``jumps`` tells of their times and sides. None where there are
+        none."""
+        self.flow.catch_up()
+        log, t, known = motion.log, motion.time, self.flow.traced.transitions
+        first = np.flatnonzero(np.diff(log.crossing_time, prepend=-np.inf) > 0)  # of those at one instant
+        last, every = np.append(first[1:], len(log.crossing_time)) - 1, log.crossing_time[first]
+        memories = np.vstack([motion.start[1][None, len(self.traced.u) :], log.memory_after])
+        before = np.array([known[k].source for k in log.crossing_transition[first].tolist()])
+        after = np.array([known[k].target for k in log.crossing_transition[last].tolist()])
+        sides = (
+            (np.hstack([held(log.u_before)[first], memories[first]]), before),
+            (np.hstack([held(log.u_after)[last], memories[last + 1]]), after),
+        )
+        which = np.flatnonzero(jumps(every, sides))
+        if not len(which):
+            return None
+        low, high = np.searchsorted(t, every[which] - reach), np.searchsorted(t, every[which] + reach, "right")
+        of = np.repeat(which, high - low)
+        at = np.arange(len(of)) - np.repeat(np.cumsum(high - low) - high, high - low)
+        bounds, ends = np.union1d(every, motion.changes[0]), np.sort([t[at], every[of]], axis=0)
+        alone = np.searchsorted(bounds, ends[1], "right") - np.searchsorted(bounds, ends[0]) == 1
+        at, of = at[alone], of[alone]
+        behind, time = t[at] >= every[of], every[of]
+        (z, mode), (z_after, mode_after) = ((states[of], modes[of]) for states, modes in sides)
+        z, mode = np.where(behind[:, None], z, z_after), np.where(behind, mode, mode_after)
+        legs = self.flow.segments(values, mode, time, t[at] - time, z)
+        told = (legs.status == codes.OK) & np.isfinite(legs.z).all(axis=1)
+        return OtherSide(*(column[told] for column in (at, np.where(behind, -1, 1), time, mode, legs.z)))
 
     def once(self, key: Any, size: int, compute: Callable[[], Any]) -> Any:
         """Return what is computed under a key; the last are kept, as many as there is room for of this size."""

@@ -349,7 +349,7 @@ def _aliases(grown: Grown) -> list[str]:
         # At no rate, which could have aliases too.
         time = np.sort(rng.uniform(window.time[0], window.time[k], _BETWEEN * k))
         fine = replace(window, time=time, values=np.zeros((len(time), counts.shape[1])))
-        if (motion := problem.motion(grown.theta, fine, start)) is not None:
+        if (motion := problem.marched(grown.theta, fine, start)) is not None:
             predicted = problem.readings(grown.theta, fine, motion, False)[0].reshape(fine.values.shape)
             counts += np.isfinite(window.values[:k]).sum(axis=0), [0.5 * turns_of(y) for y in predicted.T]
     read, swings = counts

@@ -30,10 +30,7 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         assert motion is not None
         predicted, _ = problem.readings(theta, window, motion, False)
         k, c = window.readings
-        shift = motion.time[0] - problem.instants(theta, window)[0]
-        at = problem.at(theta, window.record)
-        here = np.searchsorted(motion.time, at.clock * window.time[k] + shift - at.delays[c])
-        here = np.minimum(here, len(motion.time) - 1)
+        here = problem.sampled(theta, window, motion)
         shown = problem.shown(window, predicted)
         parts.append(
             {

@@ -276,8 +276,8 @@ def _slopes(
     def along(times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
         """Derivatives (N, n, n_active) at fixed times, and rates (N, n); derivatives of the start."""
         at: FloatArray = np.unique(np.append(times, length))
-        there = marcher.run(values, 0.0, at, z, mode, True)
-        if there is None:
+        there = marcher.run(values, 0.0, at, z, mode)
+        if there is None or (there := marcher.differentiated(values, there)) is None:
             return None
         assert there.D is not None and there.rate is not None
         end, here, D, rate = np.searchsorted(at, length), np.searchsorted(at, times), there.D, there.rate

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.arrays import BoolArray, FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.flow.sensitivity import SampledRun
 from nonsmooth.identification.arrow import Residuals
-from nonsmooth.identification.fit.motion import Marcher
+from nonsmooth.identification.fit.motion import Marcher, Sides
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Observable, Sensor, Unknowns
 from nonsmooth.identification.fit.steady import SteadyReadings, predicted
@@ -196,12 +196,61 @@ class Windows:
         """Marks of the active parameters that are not set in a run."""
         return np.array([name not in self.runs[run].settings for name in self.unknowns.active], bool)
 
+    def marched(self, theta: FloatArray, window: Window, start: FloatArray) -> SampledRun | None:
+        """The motion of a window at its samples; where delays differ, at the instants of each quantity in turn."""
+        times = self.instants(theta, window)
+        return self.march(theta, window.record, window.begin, times, start, window.mode)
+
     def motion(
         self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False
     ) -> SampledRun | None:
-        """The motion of a window at its samples; where delays differ, at the instants of each quantity in turn."""
-        instants = self.instants(theta, window)
-        return self.march(theta, window.record, window.begin, instants, start, window.mode, derivatives)
+        """The motion as the readings tell it: no farther than their step from a transition at which one jumps, they
+        stand on the side that they fit."""
+        found = self.marched(theta, window, start)
+        if found is not None and len(found.log.crossing_time):
+            found = self._sided(theta, window, found)
+        if found is None or not derivatives:
+            return found
+        return self.marcher.differentiated(self._values(theta, window), found)
+
+    def _sided(self, theta: FloatArray, window: Window, motion: SampledRun) -> SampledRun:
+        sensors, values = self.at(theta, window.record).sensors.values(), self._values(theta, window)
+
+        def jumps(time: FloatArray, sides: Sides) -> BoolArray:
+            """Mark the transitions at which a reading jumps by more than its noise."""
+            found = np.zeros(len(time), bool)
+            for noise, readout, sensor in zip(self.noise, self.readouts, sensors, strict=True):
+                before, after = (readout.value(time, z, mode, values) for z, mode in sides)
+                found |= np.abs(sensor.gain * (after - before)) > noise
+            return found
+
+        other = self.marcher.beside(values, motion, self.steps[window.record].min(), jumps)
+        if other is None:
+            return motion
+        z, mode, moved = motion.z.copy(), motion.mode.copy(), np.zeros(len(motion.z), dtype=np.int64)
+        z[other.at], mode[other.at], moved[other.at] = other.z, other.mode, other.moved
+        beside = replace(motion, z=z, mode=mode, moved=moved)
+        measured, noise = window.values[window.readings], self.noise[window.readings[1]]
+        far = [((measured - self.readings(theta, window, one, False)[0]) / noise) ** 2 for one in (motion, beside)]
+        gain = np.bincount(self.sampled(theta, window, motion), far[0] - far[1], len(z))
+        for when, side in {*zip(other.time.tolist(), other.moved.tolist(), strict=True)}:
+            mine = other.at[(other.time == when) & (other.moved == side)][::-side]  # from the transition on
+            total = np.cumsum(gain[mine])
+            back = mine[np.argmax(total) + 1 if total.max() > 0 else 0 :]  # beyond the split that fits best
+            z[back], mode[back], moved[back] = motion.z[back], motion.mode[back], 0
+        return beside
+
+    def _values(self, theta: FloatArray, window: Window) -> FloatArray:
+        values = self.at(theta, window.record).values
+        assert values is not None
+        return values
+
+    def sampled(self, theta: FloatArray, window: Window, motion: SampledRun) -> IntArray:
+        """The sample of the motion of each reading."""
+        (k, c), there = window.readings, self.at(theta, window.record)
+        shift = motion.time[0] - self.instants(theta, window)[0]
+        at = np.searchsorted(motion.time, there.clock * window.time[k] - there.delays[c] + shift - 1e-12 * abs(shift))
+        return np.minimum(at, len(motion.time) - 1)
 
     def march(
         self,
@@ -211,7 +260,6 @@ class Windows:
         times: FloatArray,
         start: FloatArray,
         mode: int,
-        derivatives: bool = False,
     ) -> SampledRun | None:
         """A motion from an instant of a run to times of its corrected clock; None where it does not come to its end."""
         values, _, clock, phase = self.at(theta, run)
@@ -222,7 +270,7 @@ class Windows:
             return None
         period = self.system.period_at(values)
         shift = 0.0 if period is None else phase * period
-        return self.marcher.run(values, begin + shift, times + shift, start, mode, derivatives, self.records[run].drive)
+        return self.marcher.run(values, begin + shift, times + shift, start, mode, self.records[run].drive)
 
     def instants(self, theta: FloatArray, window: Window) -> FloatArray:
         """Times on the record's corrected clock at which the motion is needed."""
@@ -234,18 +282,16 @@ class Windows:
         self, theta: FloatArray, window: Window, motion: SampledRun, slopes: bool
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted readings (R,), and their derivatives (R, unknowns of the window + n) where asked for."""
-        values, sensors, clock, phase = self.at(theta, window.record)
+        values, sensors, _, phase = self.at(theta, window.record)
         assert values is not None
         u, (k, c) = self.unknowns, window.readings
         n, a, p = self.marcher.flow.n, len(u.active), len(window.which)
         period, of_period = self.marcher.flow.period(values)
         predicted, table = np.empty(len(k)), np.zeros((len(k) if slopes else 0, p + n))
-        offset = 0.0 if not np.isfinite(period) else phase * period
+        of_reading = self.sampled(theta, window, motion)
         for j, (name, sensor) in enumerate(sensors.items()):
             rows = np.flatnonzero(c == j) if len(sensors) > 1 else slice(None)
-            taken = clock * window.time[k[rows]] - sensor.delay + offset
-            at = np.searchsorted(motion.time, taken - 1e-12 * abs(offset))
-            at = np.minimum(at, len(motion.time) - 1)
+            at = of_reading[rows]
             t, z, mode = motion.time[at], motion.z[at], motion.mode[at]
             readout = self.readouts[j]
             raw = readout.value(t, z, mode, values)

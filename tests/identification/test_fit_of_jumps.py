@@ -1,0 +1,85 @@
+"""Fits to readings that jump at a transition: a reading beside it may lie on the other side of the model's own."""
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+pytestmark = pytest.mark.physics
+
+
+def spiking() -> ns.System:
+    """v' = (I - v) / tau, back to the rest at the threshold 1."""
+    return ns.System(
+        states=["v"],
+        parameters={"I": 1.3, "tau": 1.0, "rest": 0.1},
+        modes={"up": lambda t, u, p: ((p.I - u.v) / p.tau,)},
+        indicators={"fire": lambda t, u, p: u.v - 1},
+        transitions=[ns.Transition("up", "up", when="fire > 0", reset=lambda t, u, p: (p.rest,))],
+    )
+
+
+def spikes(t: np.ndarray, start: float, current: float, tau: float, rest: float) -> np.ndarray:
+    """Its closed form."""
+    first = tau * np.log((current - start) / (current - 1))
+    again = tau * np.log((current - rest) / (current - 1))
+    since = np.where(t < first, t, (t - first) % again)
+    return current - (current - np.where(t < first, start, rest)) * np.exp(-since / tau)
+
+
+def drops(t: np.ndarray, speed: float, gravity: float, restitution: float) -> np.ndarray:
+    """Speed of a ball that leaves the floor upward with this one at t = 0."""
+    ends = np.cumsum(2 * speed / gravity * restitution ** np.arange(30))
+    k = np.searchsorted(ends, t, "right")
+    return speed * restitution**k - gravity * (t - np.append(0.0, ends)[k])
+
+
+def ball() -> ns.System:
+    return ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        coordinates=["z"],
+        parameters={"gravity": 10.0, "e": 0.9},
+        forcing={"z": lambda t, p: -p.gravity},
+        elements={"floor": ns.elements.Stop(at="z", side=-1, restitution="e")},
+    )
+
+
+@pytest.mark.parametrize("off", [-0.06, 0.0, 0.05])
+def test_a_state_that_fires(off: float) -> None:
+    """From the truth itself I was found as 0.67, with an anomaly."""
+    truth, t = {"I": 1.3, "tau": 1.0, "rest": 0.1}, np.arange(0.0, 12.0, 0.05)
+    y = spikes(t, 0.3, *truth.values()) + 0.01 * np.random.default_rng(1).normal(size=len(t))
+    guess = {name: value * (1 + off) for name, value in truth.items()}
+    found = ns.fit(spiking().with_parameters(**guess), {"v": (t, y)}, list(truth), progress=False)
+    for name, value in truth.items():
+        assert abs(found[name] - value) < 3 * found.uncertainty[name] < 0.3 * value
+    assert not found.anomalies, found.anomalies
+    assert found.extra["v.noise"].value == pytest.approx(0.01, rel=0.15)
+
+
+@pytest.mark.parametrize("noise", [1e-6, 0.02])
+@pytest.mark.parametrize("off", [0.0, 0.04])
+def test_a_measured_speed_that_an_impact_turns(noise: float, off: float) -> None:
+    """Impacts 0.9 s apart and less, 0.02 s between readings, and none of them at an impact."""
+    t = np.arange(0.0, 4.0, 0.02)
+    y = drops(t, 4.5, 10.0, 0.9) + noise * np.random.default_rng(2).normal(size=len(t))
+    guess = ball().with_parameters(gravity=10.0 * (1 + off), e=0.9 * (1 - off))
+    found = ns.fit(guess, {"v_z": (t, y)}, ["gravity", "e"], start={"z": 1e-3, "v_z": 4.5}, progress=False)
+    assert abs(found["e"] - 0.9) < 3 * found.uncertainty["e"] < 0.05 * noise
+    assert abs(found["gravity"] - 10.0) < 3 * found.uncertainty["gravity"] < noise
+    assert not found.anomalies
+
+
+def test_several_readings_on_the_wrong_side_of_an_impact() -> None:
+    """Four more readings about the first impact at 0.9, 0.1 ms apart: several may lie on one wrong side of it."""
+    rng, t = np.random.default_rng(5), np.arange(0.0, 4.0, 0.02)
+    t = np.sort(np.append(t, 0.9 + np.array([-2e-4, -1e-4, 1e-4, 2e-4])))
+    y = drops(t, 4.5, 10.0, 0.9) + 0.02 * rng.normal(size=len(t))
+    for off in (-0.02, 0.0, 0.02):
+        guess = ball().with_parameters(gravity=10.0 * (1 + off), e=0.9)
+        found = ns.fit(guess, {"v_z": (t, y)}, ["gravity", "e"], start={"z": 1e-3, "v_z": 4.5}, progress=False)
+        assert abs(found["e"] - 0.9) < 3 * found.uncertainty["e"] < 1e-3
+        assert abs(found["gravity"] - 10.0) < 3 * found.uncertainty["gravity"] < 0.02
+        assert not found.anomalies, found.anomalies
