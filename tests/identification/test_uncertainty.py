@@ -139,5 +139,8 @@ def test_what_is_not_determined_is_not_drawn() -> None:
         found.draw(10)
     with pytest.raises(ValueError, match="an infinite uncertainty"):
         ns.propagate(found, ns.sweep, s, "omega", [3.0], draws=5, progress=False)
+    assert list(found.only("k")) == ["k"]
+    with pytest.raises(ValueError, match="only: `kk` is not a parameter of this set; nearest: k"):
+        found.only(["kk"])
     band = ns.propagate(found.only(["k"]), ns.sweep, s, "omega", [3.0], draws=5, progress=False)
     assert "drawn_k" in band and "drawn_k_s" not in band

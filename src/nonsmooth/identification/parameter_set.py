@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import Answering
+from nonsmooth.errors import Answering, check_keys
 from nonsmooth.identification.finding import Estimate, Finding, normal_draws
 from nonsmooth.results.provenance import ATTRIBUTE, attribute, package_version, read_provenance, with_short_record
 from nonsmooth.results.representation import cut, html_table, text_table
@@ -196,8 +196,10 @@ class ParameterSet(Answering, Mapping[str, float]):
         """The interval that holds a parameter (or an extra quantity) with this probability."""
         return self.estimate(name).interval(level)
 
-    def only(self, names: Sequence[str], note: str = "") -> ParameterSet:
+    def only(self, names: Sequence[str] | str, note: str = "") -> ParameterSet:
         """The same set with these parameters alone; the others go to ``extra``, with their covariance."""
+        names = [names] if isinstance(names, str) else names
+        check_keys(names, self.estimates, "only", "a parameter", "this set")
         kept = {name: estimate for name, estimate in self.estimates.items() if name in names}
         extra = {name: estimate for name, estimate in self._rows.items() if name not in kept}
         matrix = self.full_covariance.sel(parameter=[*kept, *extra], other=[*kept, *extra])

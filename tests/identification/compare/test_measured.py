@@ -96,6 +96,8 @@ def test_a_rise_knows_its_parameter() -> None:
     found = measured_rise(motion, "rho", 0.004 + 1e-4 * first, 0.004 + 1e-4 * last, unit="N")
     np.testing.assert_allclose(found["section"].sel(state="x"), found["rho"], atol=3e-5)
     assert found["rho"].attrs["units"] == "N"
+    alone = measured_rise(motion.isel(state=[0]), "rho", 0.004 + 1e-4 * first, 0.004 + 1e-4 * last, unit="N")
+    assert alone.identical(found.isel(state=[0]))
 
 
 def test_sections_lie_over_their_parameter_in_order() -> None:

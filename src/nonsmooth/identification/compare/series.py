@@ -117,10 +117,10 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
     """
     time, phase = motion["time"].values, motion["phase"].values
     points = fold(phase, np.column_stack([motion["u"].values, time]), 8)[:, 0]
-    at = first + (last - first) * (points[:, 2] - time[0]) / (time[-1] - time[0])
+    at = first + (last - first) * (points[:, -1] - time[0]) / (time[-1] - time[0])
     return xr.Dataset(
         {
-            "section": labelled(("iterate", "state"), points[:, :2], "section points"),
+            "section": labelled(("iterate", "state"), points[:, :-1], "section points"),
             "section_error": ("state", _noise(motion)),
             parameter: labelled("iterate", at, parameter, unit),
         },

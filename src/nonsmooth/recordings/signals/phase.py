@@ -24,7 +24,8 @@ class DrivePhase:
     omega, omega_error : float
         Mean angular frequency in rad/s with its standard error.
     t_0, t_0_error : float
-        A time at which the phase is a multiple of 2 pi (the first turn, or the first maximum of the fundamental).
+        A time at which the phase is a multiple of 2 pi (the first turn, or the first maximum of the fundamental); by
+        gate its error, that of one turn, is that of every instant of a phase.
     scatter : float
         Root mean square of the turn times about the straight line through them, in seconds: the gate's resolution,
         and how unevenly the motor runs from turn to turn. By fit: that of the signal about its fundamental, as a time.
@@ -181,13 +182,13 @@ def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> 
     line, covariance = np.polyfit(turns, times, 1, cov="unscaled")
     residual = times - np.polyval(line, turns)
     scatter = float(np.sqrt(residual @ residual / (len(times) - 2)))
-    s = max(scatter, resolution / math.sqrt(12.0))
-    period, (period_error, t_0_error) = float(line[0]), (s * np.sqrt(np.diag(covariance))).tolist()
+    gate = resolution / math.sqrt(12.0)  # of one turn, and of what lies between two
+    period, period_error = float(line[0]), max(scatter, gate) * float(np.sqrt(covariance[0, 0]))
     return DrivePhase(
         TURN / period,
         TURN / period * period_error / period,
         float(times[0]),
-        t_0_error,
+        gate,
         scatter,
         "photogate",
         times,
