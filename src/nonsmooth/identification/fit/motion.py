@@ -100,15 +100,17 @@ class Marcher:
         low, high = np.searchsorted(t, every[which] - reach), np.searchsorted(t, every[which] + reach, "right")
         of = np.repeat(which, high - low)
         at = np.arange(len(of)) - np.repeat(np.cumsum(high - low) - high, high - low)
-        bounds, ends = np.union1d(every, motion.changes[0]), np.sort([t[at], every[of]], axis=0)
-        alone = np.searchsorted(bounds, ends[1], "right") - np.searchsorted(bounds, ends[0]) == 1
-        at, of = at[alone], of[alone]
-        behind, time = t[at] >= every[of], every[of]
+        behind, changes = t[at] >= every[of], motion.changes[0]
+        bounds, ends = np.union1d(every, changes), np.sort([t[at], every[of]], axis=0)
+        here = np.isin(t[at], changes) & (t[at] != every[of])  # inputs change at the sample, not on the way to it
+        between = np.searchsorted(bounds, ends[1], "right") - np.searchsorted(bounds, ends[0]) - here
+        at, of, behind, here = (column[between == 1] for column in (at, of, behind, here))
+        time, moved = every[of], np.where(behind, -1 - here, 1)
         (z, mode), (z_after, mode_after) = ((states[of], modes[of]) for states, modes in sides)
         z, mode = np.where(behind[:, None], z, z_after), np.where(behind, mode, mode_after)
         legs = self.flow.segments(values, mode, time, t[at] - time, z)
         told = (legs.status == codes.OK) & np.isfinite(legs.z).all(axis=1)
-        return OtherSide(*(column[told] for column in (at, np.where(behind, -1, 1), time, mode, legs.z)))
+        return OtherSide(*(column[told] for column in (at, moved, time, mode, legs.z)))
 
     def once(self, key: Any, size: int, compute: Callable[[], Any]) -> Any:
         """Return what is computed under a key; the last are kept, as many as there is room for of this size."""

@@ -233,8 +233,8 @@ class Windows:
         measured, noise = window.values[window.readings], self.noise[window.readings[1]]
         far = [((measured - self.readings(theta, window, one, False)[0]) / noise) ** 2 for one in (motion, beside)]
         gain = np.bincount(self.sampled(theta, window, motion), far[0] - far[1], len(z))
-        for when, side in {*zip(other.time.tolist(), other.moved.tolist(), strict=True)}:
-            mine = other.at[(other.time == when) & (other.moved == side)][::-side]  # from the transition on
+        for when, side in {*zip(other.time.tolist(), np.sign(other.moved).tolist(), strict=True)}:
+            mine = other.at[(other.time == when) & (np.sign(other.moved) == side)][::-side]  # from the transition on
             total = np.cumsum(gain[mine])
             back = mine[np.argmax(total) + 1 if total.max() > 0 else 0 :]  # beyond the split that fits best
             z[back], mode[back], moved[back] = motion.z[back], motion.mode[back], 0
