@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +14,10 @@ from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import warn_if_slow
-from nonsmooth.flow.inputs import DelayedInputs, driven, under
+from nonsmooth.flow.inputs import DelayedInputs, driven
 from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.saltation import Jump, OneOrderOnly
+from nonsmooth.flow.sampled import SampledRun, held, sampled
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state
 from nonsmooth.flow.variational import VariationalFlow
@@ -29,68 +30,6 @@ if TYPE_CHECKING:
 
 CHANGE = -1  # of inputs, among transitions
 RTOL = 1e-15  # where the flow is not exact
-
-
-@dataclass(frozen=True, eq=False)
-class SampledRun:
-    """A run under inputs at its samples.
-
-    Attributes
-    ----------
-    time : array (N,)
-        The system's time.
-    z : array (N, n)
-        States and memory.
-    mode, segment : array (N,) of int
-        The mode, and how many transitions came before.
-    log : TrajectoryLog
-    begin : float
-    start : (int, array (n,))
-        Mode, states and memory at the beginning, before any transition.
-    course, changes
-        The inputs of the run, the instants at which they change, and the log's samples there.
-    moved : array (N,) of int, or 0
-        By how many segments a sample stands beside the one in whose time it lies.
-    D, rate, of_time : array
-        Those of its :class:`Variation`, where they were asked for.
-    """
-
-    time: FloatArray
-    z: FloatArray
-    mode: IntArray
-    segment: IntArray
-    log: TrajectoryLog
-    begin: float
-    start: tuple[int, FloatArray]
-    course: DelayedInputs | None
-    changes: tuple[FloatArray, IntArray]
-    moved: IntArray | int = 0
-    D: FloatArray | None = None
-    rate: FloatArray | None = None
-    of_time: FloatArray | None = None
-
-
-def sampled(
-    engine: Engine,
-    tables: Any,
-    state: State,
-    begin: float,
-    times: FloatArray,
-    course: DelayedInputs | None = None,
-    most: float = np.inf,
-) -> SampledRun:
-    """March from a state at ``begin`` to the samples; given up beyond ``most`` steps for each."""
-    changes, instants, cuts = under(course, state, begin, times[-1]), times, np.zeros(0)
-    if changes is not None:
-        cuts, instants = changes.times, np.union1d(times, changes.times)
-    start = int(state.counters[0]), np.concatenate([state.u, state.memory])
-    # the start itself is a sample too: there the transitions that hold already have been taken
-    samples, most = np.append(begin, instants), most * len(instants)
-    log = engine.record(tables, state, times[-1], samples, changes=changes, most=most)
-    at = slice(1, None) if changes is None else 1 + np.searchsorted(instants, times)
-    z = np.hstack([held(log.sample_u), log.sample_memory])[at]
-    where = cuts, 1 + np.searchsorted(instants, cuts)
-    return SampledRun(times, z, log.sample_mode[at], log.sample_segment[at], log, begin, start, course, where)
 
 
 class Variation:
@@ -163,11 +102,6 @@ class Variation:
     def _of_jumps(self) -> float:
         at_start = 0.0 if self.start is None else float(np.linalg.slogdet(self.start.R_z)[1])
         return at_start + sum(-np.inf if jump is None else jump.log_determinant for jump in self.jumps)
-
-
-def held(u: FloatArray) -> FloatArray:
-    """States with zeros for those that a mode lacks."""
-    return np.where(np.isnan(u), 0.0, u)
 
 
 def apart(

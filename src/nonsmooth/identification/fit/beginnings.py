@@ -16,7 +16,8 @@ from nonsmooth.errors import SolveError
 from nonsmooth.identification.fit.first_level import Stage, settle_soft
 from nonsmooth.identification.fit.first_windows import WIDE, first_windows, told_start
 from nonsmooth.identification.fit.growth import POOR
-from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.identification.fit.window import Window
+from nonsmooth.identification.fit.windows import Windows
 
 _SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
 _GUESSES, _STARTS = 128, 8  # drawn; starts for each guess

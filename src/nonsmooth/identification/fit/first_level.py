@@ -26,7 +26,8 @@ from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError, check_keys, shortened
 from nonsmooth.identification.arrow import Residuals, inverted, reduced, settle
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
-from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.identification.fit.window import Window
+from nonsmooth.identification.fit.windows import Windows
 from nonsmooth.recordings.recording import runs_of
 from nonsmooth.system.system import System
 

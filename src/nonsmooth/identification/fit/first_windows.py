@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.identification.fit.window import Window
+from nonsmooth.identification.fit.windows import Windows
 from nonsmooth.system.system import System
 
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken

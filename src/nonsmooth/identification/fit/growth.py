@@ -28,7 +28,8 @@ from nonsmooth.identification.fit.first_level import (
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, residuals_of, robust_size, strange
 from nonsmooth.identification.fit.steady import ROUNDING
-from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.identification.fit.window import Window
+from nonsmooth.identification.fit.windows import Windows
 from nonsmooth.recordings.signals.spectrum import correlation_times
 
 POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.inputs import Driven
-from nonsmooth.flow.sensitivity import SampledRun, Variation, held, sampled
+from nonsmooth.flow.sampled import SampledRun, sampled
+from nonsmooth.flow.sensitivity import Variation
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.system import System
@@ -21,20 +22,6 @@ from nonsmooth.system.system import System
 KEPT = 100_000  # samples of the motions that a marcher keeps
 STEPS = 1000  # between two readings: a motion that takes more is none that they tell of
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
-
-
-class OtherSide(NamedTuple):
-    """Samples (K,) on the other side of a transition: which, by how many segments moved, the transition's time, and
-    the modes and states there."""
-
-    at: IntArray
-    moved: IntArray
-    time: FloatArray
-    mode: IntArray
-    z: FloatArray
-
-
-Sides = tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray]]  # states and modes before and after transitions
 
 
 class Marcher:
@@ -76,41 +63,6 @@ class Marcher:
             return replace(motion, rate=run.rate, D=run.D, of_time=run.of_time)
 
         return self.once((id(motion.log), np.asarray(motion.moved).tobytes()), len(motion.time), derived)
-
-    def beside(
-        self, values: FloatArray, motion: SampledRun, reach: float, jumps: Callable[[FloatArray, Sides], BoolArray]
-    ) -> OtherSide | None:
-        """The samples no farther than ``reach`` from a transition, as they are where it is taken later, or has been
-        taken before; of those transitions only that ``jumps`` tells of their times and sides. None where there are
-        none."""
-        self.flow.catch_up()
-        log, t, known = motion.log, motion.time, self.flow.traced.transitions
-        first = np.flatnonzero(np.diff(log.crossing_time, prepend=-np.inf) > 0)  # of those at one instant
-        last, every = np.append(first[1:], len(log.crossing_time)) - 1, log.crossing_time[first]
-        memories = np.vstack([motion.start[1][None, len(self.traced.u) :], log.memory_after])
-        before = np.array([known[k].source for k in log.crossing_transition[first].tolist()])
-        after = np.array([known[k].target for k in log.crossing_transition[last].tolist()])
-        sides = (
-            (np.hstack([held(log.u_before)[first], memories[first]]), before),
-            (np.hstack([held(log.u_after)[last], memories[last + 1]]), after),
-        )
-        which = np.flatnonzero(jumps(every, sides))
-        if not len(which):
-            return None
-        low, high = np.searchsorted(t, every[which] - reach), np.searchsorted(t, every[which] + reach, "right")
-        of = np.repeat(which, high - low)
-        at = np.arange(len(of)) - np.repeat(np.cumsum(high - low) - high, high - low)
-        behind, changes = t[at] >= every[of], motion.changes[0]
-        bounds, ends = np.union1d(every, changes), np.sort([t[at], every[of]], axis=0)
-        here = np.isin(t[at], changes) & (t[at] != every[of])  # inputs change at the sample, not on the way to it
-        between = np.searchsorted(bounds, ends[1], "right") - np.searchsorted(bounds, ends[0]) - here
-        at, of, behind, here = (column[between == 1] for column in (at, of, behind, here))
-        time, moved = every[of], np.where(behind, -1 - here, 1)
-        (z, mode), (z_after, mode_after) = ((states[of], modes[of]) for states, modes in sides)
-        z, mode = np.where(behind[:, None], z, z_after), np.where(behind, mode, mode_after)
-        legs = self.flow.segments(values, mode, time, t[at] - time, z)
-        told = (legs.status == codes.OK) & np.isfinite(legs.z).all(axis=1)
-        return OtherSide(*(column[told] for column in (at, moved, time, mode, legs.z)))
 
     def once(self, key: Any, size: int, compute: Callable[[], Any]) -> Any:
         """Return what is computed under a key; the last are kept, as many as there is room for of this size."""

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.arrays import IntArray
-from nonsmooth.flow.sensitivity import SampledRun
+from nonsmooth.flow.sampled import SampledRun
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.results.labels import labels_of
 from nonsmooth.system.symbolic.numeric import numeric

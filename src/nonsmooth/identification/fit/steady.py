@@ -29,7 +29,7 @@ from nonsmooth.system.system import System
 
 KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
 if TYPE_CHECKING:
-    from nonsmooth.flow.sensitivity import SampledRun
+    from nonsmooth.flow.sampled import SampledRun
     from nonsmooth.identification.fit.motion import Marcher
 
 TRANSIENT = 300

@@ -17,78 +17,15 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.flow.sensitivity import SampledRun
+from nonsmooth.flow.sampled import SampledRun
 from nonsmooth.identification.arrow import Residuals
-from nonsmooth.identification.fit.motion import Marcher, Sides
+from nonsmooth.identification.fit.jumps import Sides, sided
+from nonsmooth.identification.fit.motion import Marcher
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Observable, Sensor, Unknowns
 from nonsmooth.identification.fit.steady import SteadyReadings, predicted
-from nonsmooth.recordings.signals.spectrum import correlation_times
+from nonsmooth.identification.fit.window import Window
 from nonsmooth.system.system import System
-
-
-@dataclass(frozen=True, eq=False)
-class Window:
-    """A window of a record.
-
-    Attributes
-    ----------
-    record : int
-    first, last : int
-        Its samples: ``first <= k < last``.
-    begin : float
-        Time of its start on the record's clock: that of its first sample, less the longest delay.
-    start : array (n,)
-        States and memory at its start.
-    spread : array (n,)
-        How far each of them may move; 0: not at all.
-    mode : int
-    which : array of int
-        Places of its unknowns.
-    time, values : array (N,), (N, c)
-        Its samples.
-    """
-
-    record: int
-    first: int
-    last: int
-    begin: float
-    start: FloatArray
-    spread: FloatArray
-    mode: int
-    which: NDArray[np.intp]
-    time: FloatArray
-    values: FloatArray
-
-    def cut(self, record: Record, last: int, **changes: Any) -> Window:
-        """The window up to another sample of its record."""
-        here = slice(self.first, last)
-        return replace(self, last=last, time=record.time[here], values=record.values[here], **changes)
-
-    @cached_property
-    def readings(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Sample and quantity of each reading, in the order of time."""
-        k, c = np.nonzero(np.isfinite(self.values))
-        return k, c
-
-    @cached_property
-    def free(self) -> NDArray[np.intp]:
-        """States of the start that are not known."""
-        return np.flatnonzero(self.spread > 0)
-
-    @property
-    def n_free(self) -> int:
-        return len(self.free)
-
-    def by_instant(self, rows: FloatArray) -> FloatArray:
-        """Sums of rows over the readings of each instant; the rows of the start are left out."""
-        k, _ = self.readings
-        return np.add.reduceat(rows[: len(k)], np.flatnonzero(np.diff(k, prepend=-1)), axis=0)
-
-    def correlation(self, r: FloatArray) -> float:
-        """Samples that share one independent error: of the quantity for which they are the most."""
-        _, c = self.readings
-        return max(correlation_times(r[: len(c)][c == one]) for one in np.unique(c))
 
 
 class There(NamedTuple):
@@ -224,21 +161,13 @@ class Windows:
                 found |= np.abs(sensor.gain * (after - before)) > noise
             return found
 
-        other = self.marcher.beside(values, motion, self.steps[window.record].min(), jumps)
-        if other is None:
-            return motion
-        z, mode, moved = motion.z.copy(), motion.mode.copy(), np.zeros(len(motion.z), dtype=np.int64)
-        z[other.at], mode[other.at], moved[other.at] = other.z, other.mode, other.moved
-        beside = replace(motion, z=z, mode=mode, moved=moved)
-        measured, noise = window.values[window.readings], self.noise[window.readings[1]]
-        far = [((measured - self.readings(theta, window, one, False)[0]) / noise) ** 2 for one in (motion, beside)]
-        gain = np.bincount(self.sampled(theta, window, motion), far[0] - far[1], len(z))
-        for when, side in {*zip(other.time.tolist(), np.sign(other.moved).tolist(), strict=True)}:
-            mine = other.at[(other.time == when) & (np.sign(other.moved) == side)][::-side]  # from the transition on
-            total = np.cumsum(gain[mine])
-            back = mine[np.argmax(total) + 1 if total.max() > 0 else 0 :]  # beyond the split that fits best
-            z[back], mode[back], moved[back] = motion.z[back], motion.mode[back], 0
-        return beside
+        def misfit(one: SampledRun) -> FloatArray:
+            """Sum of the squared residuals of each sample, over the noise."""
+            left = window.values[window.readings] - self.readings(theta, window, one, False)[0]
+            squares = (left / self.noise[window.readings[1]]) ** 2
+            return np.bincount(self.sampled(theta, window, one), squares, len(one.time)).astype(float)
+
+        return sided(self.marcher.flow, values, motion, self.steps[window.record].min(), jumps, misfit)
 
     def _values(self, theta: FloatArray, window: Window) -> FloatArray:
         values = self.at(theta, window.record).values
