@@ -27,7 +27,7 @@ def test_places_between_are_looked_at_where_the_farthest_is_of_another_piece(
     monkeypatch.setattr(likelihood, "reduced", lambda *_: (np.eye(1),))
     unknowns = SimpleNamespace(low=np.array([-20.0]), high=np.array([9.0]), precision=np.zeros((1, 1)))
     problem = SimpleNamespace(
-        unknowns=unknowns, pieces=[None], steady=(), motion=motion, cost=cost, residuals=lambda *_: None
+        unknowns=unknowns, pieces=[None], steady=(), marched=motion, cost=cost, residuals=lambda *_: None
     )
     problem.weights = lambda state: state
     found = likelihood._beside(SimpleNamespace(problem=problem, theta=np.zeros(1), starts=[None]))
