@@ -151,9 +151,17 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     names = tuple(name for name, there in zip(names, powers.any(axis=0), strict=True) if there)
     logs = np.log(np.maximum(np.abs(y), 1e-9) / factors)
     u = np.exp(np.linalg.lstsq(powers[:, powers.any(axis=0)], logs, rcond=None)[0])
+    told = ", ".join(label for label in labels if label != "gain")
+    advice = (
+        f"The observations ({told}) contradict each other by far: look at the mass, the wheel and the units, and leave "
+        "out what is in doubt"
+    )
     for _ in range(_ROUNDS):
         jacobian = slopes(u)
-        found = inverse(jacobian.T @ weight @ jacobian)
+        try:
+            found = inverse(jacobian.T @ weight @ jacobian)
+        except np.linalg.LinAlgError:
+            raise SolveError(f"the adjustment has come to where nothing determines its unknowns. {advice}") from None
         influence = found @ jacobian.T @ weight
         change = influence @ (y - expected(u))
         u, off = u + change, np.abs(change) / np.sqrt(np.diag(found))
@@ -162,9 +170,7 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     else:
         raise SolveError(
             f"the adjustment has not converged after {_ROUNDS} rounds: {names[np.argmax(off)]!r} still changes by "
-            f"{np.max(off):.1g} of its standard uncertainty. The observations "
-            f"({', '.join(label for label in labels if label != 'gain')}) contradict each other by far: look at the "
-            "mass, the wheel and the units, and leave out what is in doubt"
+            f"{np.max(off):.1g} of its standard uncertainty. {advice}"
         )
     left, freedom = y - expected(u), len(y) - len(names)
     pulls = dict[str, float]()
