@@ -24,8 +24,9 @@ class DrivePhase:
     omega, omega_error : float
         Mean angular frequency in rad/s with its standard error.
     t_0, t_0_error : float
-        A time at which the phase is a multiple of 2 pi (the first turn, or the first maximum of the fundamental); by
-        gate its error, that of one turn, is that of every instant of a phase.
+        A time at which the phase is a multiple of 2 pi (the first turn, or the first maximum of the fundamental). By
+        gate its error is that of any instant of a phase: by how far one turn lies off its neighbours, as the gate's
+        noise and a motor that is uneven from turn to turn make it, and no less than the gate's resolution.
     scatter : float
         Root mean square of the turn times about the straight line through them, in seconds: the gate's resolution,
         and how unevenly the motor runs from turn to turn. By fit: that of the signal about its fundamental, as a time.
@@ -182,13 +183,16 @@ def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> 
     line, covariance = np.polyfit(turns, times, 1, cov="unscaled")
     residual = times - np.polyval(line, turns)
     scatter = float(np.sqrt(residual @ residual / (len(times) - 2)))
-    gate = resolution / math.sqrt(12.0)  # of one turn, and of what lies between two
+    gate = resolution / math.sqrt(12.0)
     period, period_error = float(line[0]), max(scatter, gate) * float(np.sqrt(covariance[0, 0]))
+    share = counts[:-1] / (counts[:-1] + counts[1:])  # where a turn lies between its neighbours, straight between them
+    off = times[1:-1] - times[:-2] - share * (times[2:] - times[:-2])
+    one = float(np.sqrt(np.mean(off**2 / (1.0 + share**2 + (1.0 - share) ** 2))))
     return DrivePhase(
         TURN / period,
         TURN / period * period_error / period,
         float(times[0]),
-        gate,
+        max(one, gate),
         scatter,
         "photogate",
         times,
