@@ -180,8 +180,8 @@ def _holds(read: Any, held: Mapping[sp.Symbol, _Ends], condition: str, compared:
     sides = [(_value(left, one), _value(right, one)) for one in cases]
     compared += chain.from_iterable(sides)
     parts = [_COMPARE[type(read)](*pair) for pair in sides]
-    speeds = [name for name in map(str, read.free_symbols) if name.endswith("impact_speed")]
-    if speeds and len(parts) > 1 and (~parts[0] & parts[1]).any():
+    speeds = [str(one) for one in read.free_symbols if len(held[one]) > 1 and str(one).endswith("impact_speed")]
+    if speeds and (~parts[0] & parts[1]).any():
         raise ValueError(
             f"{shortened(condition)}: of {speeds[0]} this result holds the largest value alone, which says nothing of "
             f"the smaller ones: compare it from below ({speeds[0]} < ...), or take the quantity that ends in _maximum"
