@@ -36,6 +36,8 @@ def program(*words: str, **options: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "nonsmooth.cli.main", *words]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     pipe = subprocess.PIPE
+    # A shell in the background ignores Ctrl-C, and so would what it starts.
+    options = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL), **options}
     return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment, **options)
 
 
