@@ -63,7 +63,7 @@ coverage: $(VENV)/.compiled-run  ## identify 40 virtual rigs; writes docs/measur
 coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
 	$(BIN)/python -m studies.savi2007.tests.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
-coverage-fit: $(VENV)/.compiled-test  ## fit ten systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
+coverage-fit: $(VENV)/.compiled-test  ## fit twelve systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
 	$(BIN)/python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md
 
 equilibria: $(VENV)/.compiled-test  ## equilibria of 200 random systems beside their enumeration (half an hour)

@@ -1,4 +1,4 @@
-"""Ten systems with data from another program: equations written out again here, SciPy's DOP853 between events.
+"""Twelve systems with data from another program: equations written out again here, SciPy's DOP853 between events.
 
 Each case has the system, the true parameters, which of them a fit is to find, and ``motion(p, start, times)``: states
 (or what is measured) at the instants. The readings then get noise, a clock that jitters, and a resolution.
@@ -133,7 +133,23 @@ def _impact(p, start, t):
         return [u[1], p["A"] * np.cos(p["omega"] * t) - p["k"] * u[0] - p["c"] * u[1]]
 
     hit = (lambda t, u: u[0] - p["d"], 1, lambda t, u: ("", np.array([p["d"], -p["e"] * u[1]])))
-    return march({"": f}, {"": [hit]}, "", [start["x"], start["v"]], t)[:, :1]
+    return march({"": f}, {"": [hit]}, "", [start["x"], start["v"]], t)
+
+
+def cell() -> ns.System:
+    """v' = (I - v) / tau, begun anew at ``rest`` where v comes to 1."""
+    return ns.System(
+        states=["v"],
+        parameters={"I": 2.0, "tau": 1.0, "rest": 0.1},
+        modes={"charges": lambda t, u, p: ((p.I - u.v) / p.tau,)},
+        indicators={"threshold": lambda t, u, p: u.v - 1},
+        transitions=[ns.Transition("charges", "charges", when="threshold > 0", reset=lambda t, u, p: (p.rest,))],
+    )
+
+
+def _cell(p, start, t):
+    fire = (lambda t, u: u[0] - 1.0, 1, lambda t, u: ("", np.array([p["rest"]])))
+    return march({"": lambda t, u: [(p["I"] - u[0]) / p["tau"]]}, {"": [fire]}, "", [start["v"]], t)
 
 
 def _belt(p, start, t):
@@ -317,10 +333,30 @@ CASES = {
             ns.models.impact_oscillator,
             {"k": 1.0, "c": 0.1, "omega": 1.3, "d": 0.6, "e": 0.6, "A": 1.0},
             ["k", "c", "d", "e"],
-            _impact,
+            lambda p, start, t: _impact(p, start, t)[:, :1],
             _xv,
             {"x": "position"},
             70.0,
+        ),
+        Case(
+            "impact oscillator, speed",
+            ns.models.impact_oscillator,
+            {"k": 1.0, "c": 0.1, "omega": 1.3, "d": 0.6, "e": 0.6, "A": 1.0},
+            ["k", "c", "d", "e"],
+            lambda p, start, t: _impact(p, start, t)[:, 1:],
+            _xv,
+            {"v": "speed"},
+            70.0,
+        ),
+        Case(
+            "cell that fires",
+            cell,
+            {"I": 2.0, "tau": 1.0, "rest": 0.1},
+            ["I", "tau", "rest"],
+            _cell,
+            lambda rng: {"v": 0.8 * rng.random()},
+            {"v": "potential"},
+            12.0,
         ),
         Case(
             "stick-slip belt",

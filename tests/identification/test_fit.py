@@ -15,6 +15,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.flow.inputs import driven
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.fit import problem_of
+from nonsmooth.identification.fit.jumps import sided
 from nonsmooth.identification.fit.motion import Marcher
 
 M, K, C, RHO, W = 0.838, 8.47, 0.87, 0.3, 5.0
@@ -499,6 +500,31 @@ def test_a_sample_where_an_input_changes_is_the_limit_behind_it():
     motion = marcher.differentiated(values, marcher.run(values, 0.0, times, np.zeros(4), 0, drive=drive))
     np.testing.assert_allclose(motion.z[:, :2], [[0, 0], [0, 0], [0.375, 1.5]], atol=1e-14)
     np.testing.assert_allclose(motion.D[:, :2, -1], [[0, 0], [0, -3], [-1.5, -3]], atol=1e-14)
+
+
+def test_an_input_that_changes_at_a_sample_does_not_stand_between_it_and_a_jump():
+    """A mass at speed 1 meets a stop at t = 0.9; the reading at 1, where a force begins, may still be of its way on."""
+    mass = ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        forcing={"q": lambda t, p: p.force},
+        inputs={"force": "N"},
+        elements={"stop": ns.elements.Stop(at="q", position=0.9, restitution=0.5)},
+    )
+    marcher, times = Marcher(mass, ()), np.array([0.5, 1.0, 1.5])
+    drive, values = driven(mass, {"force": ns.Input([0, 1], [0.0, 1.0], between="steps")}), mass.parameter_vector()
+    motion = marcher.run(values, 0.0, times, np.array([0.0, 1.0, 0.0, 0.0]), 0, drive=drive)
+    read = np.array([1.0, 1.0, 0.0])
+
+    def told(reach):
+        def jumps(time, sides):
+            return np.abs(sides[1][0][:, 1] - sides[0][0][:, 1]) > 0.1
+
+        return sided(marcher.flow, values, motion, reach, jumps, lambda run: (run.z[:, 1] - read) ** 2)
+
+    np.testing.assert_allclose(told(0.01).z[:, :2], [[0.5, 1.0], [0.85, -0.5], [0.725, 0.0]], atol=1e-14)
+    np.testing.assert_allclose(told(0.2).z[:, :2], [[0.5, 1.0], [1.0, 1.0], [0.725, 0.0]], atol=1e-14)
 
 
 def test_a_simulated_run_has_no_readings_at_its_crossings() -> None:

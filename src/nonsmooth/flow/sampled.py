@@ -51,6 +51,11 @@ class SampledRun:
     rate: FloatArray | None = None
     of_time: FloatArray | None = None
 
+    @property
+    def begun(self) -> tuple[int, FloatArray]:
+        """Mode, states and memory at the beginning, behind the transitions that are taken there at once."""
+        return int(self.log.sample_mode[0]), np.concatenate([held(self.log.sample_u[0]), self.log.sample_memory[0]])
+
 
 def sampled(
     engine: Engine,

@@ -54,11 +54,10 @@ class Variation:
     """
 
     def __init__(self, flow: VariationalFlow, values: FloatArray, run: SampledRun) -> None:
-        n, size, log, course = flow.n, flow.n + flow.n_active, run.log, run.course
-        first = int(log.sample_mode[0]), np.concatenate([held(log.sample_u[0]), log.sample_memory[0]])
+        n, size, course = flow.n, flow.n + flow.n_active, run.course
         flow.catch_up()
-        self.start = settled(flow, values, run.start, first, run.begin)
-        modes, starts, times, transitions, before = apart(flow, log, first, run.begin, run.changes)
+        self.start = settled(flow, values, run.start, run.begun, run.begin)
+        modes, starts, times, transitions, before = apart(flow, run.log, run.begun, run.begin, run.changes)
         # A sample at a crossing is the limit after it; segments behind the last sample's are left out.
         behind = np.searchsorted(times[1:], run.time, "right") + run.moved
         count = int(behind.max()) + 1

@@ -1,7 +1,8 @@
 """The fit over the first, short windows: from a guess that may be far off to where longer windows take over.
 
 Far from the solution the noise is taken for as large as a part of the residuals, and the parameters for known about
-their guess to their own size: so no step runs away while the residuals are large, and both fade as they fall. A window
+their guess to their own size: so no step runs away while the residuals are large, and both fade as they fall. Steps are
+taken as if a reading lay on either side of the next jump, however far, and judged with it where it lies. A window
 that fits much worse than most has missed a transition, or has one too many, and no small step of its start mends it;
 its start is then searched anew: from the window before, from the samples, and at random. Rough fits on the way are of
 all windows together (`level`), and of one alone at given parameters (`alone`).
@@ -70,16 +71,20 @@ class Stage:
         return Stage(self.problem.of(pieces), self.theta, starts)
 
 
-def level(stage: Stage, used: Any = None) -> Stage:
+def level(stage: Stage, used: Any = None, reach: float = 1.0) -> Stage:
     """A rough fit on the way, in which the parameters are known to about their own size.
 
     What windows so short do not tell then stays where it is: a coefficient of restitution of 1e8, tried where hardly an
-    impact was seen, makes a motion of hours.
+    impact was seen, makes a motion of hours. Its steps are those of this ``reach``.
     """
     problem = stage.problem
     if not np.isfinite(np.concatenate([*stage.state.residuals, stage.state.alone])).all():
         raise SolveError("a motion over longer windows, or to a steady state, does not come to its end")
-    return Stage(problem, *settle(problem, stage.theta, stage.starts, used, _known(problem), rough=True)[:3])
+    trial = replace(problem, reach=reach)
+    theta, starts, state, *_ = settle(trial, stage.theta, stage.starts, used, _known(problem), rough=True)
+    if problem.jumps and reach != problem.reach:
+        state = problem.residuals(theta, starts, True)
+    return Stage(problem, theta, starts, state)
 
 
 def foreseen(problem: Windows, theta: FloatArray, starts: FloatArray) -> float:
@@ -204,7 +209,7 @@ def settle_first(problem: Windows, theta: FloatArray, length: float, start: Floa
         used = ~bad
         if not changed and stage is fitted and not _smaller(stage, noise):
             break
-    stage = level(stage, used)
+    stage = level(stage, used, np.inf)
     moves = [bool(np.isfinite(r).all()) for r in stage.state.residuals]
     if not any(moves):
         raise SolveError("no window of the record can be simulated at the parameters that fit it best")
@@ -248,13 +253,13 @@ def _soft(stage: Stage, noise: FloatArray, used: Any = None) -> Stage:
     """The level at this noise; while that is not yet its own, the parameters stay about their guess."""
     problem = stage.problem
     if (noise <= problem.noise).all():
-        return level(stage, used)
+        return level(stage, used, np.inf)
     u, size = problem.unknowns, own_size(problem)
     near, far = np.where(size < np.inf, size / _REACH, -np.inf), _REACH * size
     low = np.maximum(u.low, np.where(u.guess > 0, near, -far))
     high = np.minimum(u.high, np.where(u.guess < 0, -near, far))
     soft = replace(problem, noise=noise, unknowns=replace(u, low=low, high=high))
-    return replace(level(replace(stage, problem=soft), used), problem=problem)
+    return replace(level(replace(stage, problem=soft), used, np.inf), problem=problem)
 
 
 def _others(stage: Stage, i: int, rng: np.random.Generator) -> list[tuple[Window, FloatArray]]:

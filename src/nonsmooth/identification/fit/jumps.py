@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
-from nonsmooth.flow.sampled import SampledRun, held
+from nonsmooth.flow.sampled import SampledRun
+from nonsmooth.flow.sensitivity import CHANGE, apart
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
@@ -33,41 +34,33 @@ def sided(
 
     ``jumps`` marks the transitions at which a reading jumps, by their times and sides; ``misfit`` has the sum of
     squares of each sample (N,)."""
-    flow.catch_up()
-    log, t, known = motion.log, motion.time, flow.traced.transitions
-    first = np.flatnonzero(np.diff(log.crossing_time, prepend=-np.inf) > 0)  # of those at one instant
-    last, every = np.append(first[1:], len(log.crossing_time)) - 1, log.crossing_time[first]
-    memories = np.vstack([motion.start[1][None, flow.n_u :], log.memory_after])
-    before = np.array([known[k].source for k in log.crossing_transition[first].tolist()])
-    after = np.array([known[k].target for k in log.crossing_transition[last].tolist()])
-    sides = (
-        (np.hstack([held(log.u_before)[first], memories[first]]), before),
-        (np.hstack([held(log.u_after)[last], memories[last + 1]]), after),
-    )
-    which = np.flatnonzero(jumps(every, sides))
-    if not len(which):
+    modes, starts, times, transitions, before = apart(flow, motion.log, motion.begun, motion.begin, motion.changes)
+    bounds, mode = np.array(times[1:]), np.array(modes)
+    hit = np.array([j for j, chain in enumerate(transitions) if chain != (CHANGE,)], dtype=np.int64)
+    ends = np.array([before[j] for j in hit]), np.array([starts[j + 1] for j in hit])
+    seen = jumps(bounds[hit], ((ends[0], mode[hit]), (ends[1], mode[hit + 1])))
+    if not seen.any():
         return motion
-    low, high = np.searchsorted(t, every[which] - reach), np.searchsorted(t, every[which] + reach, "right")
-    of = np.repeat(which, high - low)
+    t, hit, (old, new) = motion.time, hit[seen], (states[seen] for states in ends)
+    low, high = np.searchsorted(t, bounds[hit] - reach), np.searchsorted(t, bounds[hit] + reach, "right")
+    of = np.repeat(np.arange(len(hit)), high - low)
     at = np.arange(len(of)) - np.repeat(np.cumsum(high - low) - high, high - low)
-    behind, changes = t[at] >= every[of], motion.changes[0]
-    bounds, ends = np.union1d(every, changes), np.sort([t[at], every[of]], axis=0)
-    here = np.isin(t[at], changes) & (t[at] != every[of])  # inputs change at the sample, not on the way to it
-    between = np.searchsorted(bounds, ends[1], "right") - np.searchsorted(bounds, ends[0]) - here
-    at, of, behind, here = (column[between == 1] for column in (at, of, behind, here))
-    time, moved = every[of], np.where(behind, -1 - here, 1)
-    (z, mode), (z_after, mode_after) = ((states[of], modes[of]) for states, modes in sides)
-    z, mode = np.where(behind[:, None], z, z_after), np.where(behind, mode, mode_after)
-    legs = flow.segments(values, mode, time, t[at] - time, z)
+    # A sample stands in the segment before or behind the transition, an instant at its end included.
+    here, ending = (np.searchsorted(bounds, t[at], side) for side in ("right", "left"))
+    early, late = here == hit[of], (here > hit[of]) & (ending <= hit[of] + 1)
+    of, at, here, early = (column[early | late] for column in (of, at, here, early))
+    to, time = hit[of] + early, bounds[hit[of]]
+    legs = flow.segments(values, mode[to], time, t[at] - time, np.where(early[:, None], new[of], old[of]))
     told = (legs.status == codes.OK) & np.isfinite(legs.z).all(axis=1)
-    at, of, moved = at[told], of[told], moved[told]
-    other = replace(motion, z=motion.z.copy(), mode=motion.mode.copy(), moved=np.zeros(len(t), dtype=np.int64))
-    assert isinstance(other.moved, np.ndarray)
-    other.z[at], other.mode[at], other.moved[at] = legs.z[told], mode[told], moved
+    of, at, early, to, here = (column[told] for column in (of, at, early, to, here))
+    moved = np.zeros(len(t), dtype=np.int64)
+    moved[at] = to - here
+    other = replace(motion, z=motion.z.copy(), mode=motion.mode.copy(), moved=moved)
+    other.z[at], other.mode[at] = legs.z[told], mode[to]
     gain = misfit(motion) - misfit(other)
-    for group in {*zip(of.tolist(), np.sign(moved).tolist(), strict=True)}:
-        mine = at[(of == group[0]) & (np.sign(moved) == group[1])][:: -group[1]]  # from the transition on
+    for which, side in {*zip(of.tolist(), early.tolist(), strict=True)}:
+        mine = at[(of == which) & (early == side)][:: -1 if side else 1]  # from the transition on
         total = np.cumsum(gain[mine])
         back = mine[np.argmax(total) + 1 if total.max() > 0 else 0 :]  # beyond the split that fits best
-        other.z[back], other.mode[back], other.moved[back] = motion.z[back], motion.mode[back], 0
+        other.z[back], other.mode[back], moved[back] = motion.z[back], motion.mode[back], 0
     return other

@@ -62,7 +62,8 @@ class Marcher:
                 return None
             return replace(motion, rate=run.rate, D=run.D, of_time=run.of_time)
 
-        return self.once((id(motion.log), np.asarray(motion.moved).tobytes()), len(motion.time), derived)
+        moved = np.asarray(motion.moved).tobytes()  # what is derived of a log keeps it, and its id, alive
+        return self.once((id(motion.log), moved), len(motion.time), derived)
 
     def once(self, key: Any, size: int, compute: Callable[[], Any]) -> Any:
         """Return what is computed under a key; the last are kept, as many as there is room for of this size."""

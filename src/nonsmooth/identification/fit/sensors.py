@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -126,6 +127,13 @@ class Observable:
                 f"{name!r} is the force of an element of a system whose modes are made when they are visited: such a "
                 "force cannot be fitted; measure a state or an output of your own"
             )
+
+    @cached_property
+    def jumps(self) -> bool:
+        """Mark of what may jump at a transition: a state does where a reset changes it."""
+        traced, k = self.system.traced, self.state
+        resets = [jump.reset[k] for jump in traced.transitions if jump.reset is not None]
+        return k < 0 or traced.asks or any(x != traced.u[k] for x in resets)
 
     def value(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray) -> FloatArray:
         """Values (N,) at N samples."""

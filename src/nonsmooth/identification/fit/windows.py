@@ -49,8 +49,9 @@ class Windows:
 
     ``noise``: standard deviation of a reading of each quantity, rounding included. ``modes``: in which each record
     may begin, the first guess first. ``colour``: correlation of readings of each quantity over its ``step``. ``loss``:
-    noise deviations from which on a residual counts linearly (Huber). ``steady``: readings of steady states, which are
-    runs behind the records.
+    noise deviations from which on a residual counts linearly (Huber). ``reach``: steps within which a reading may lie
+    on the other side of a transition at which it jumps. ``steady``: readings of steady states, which are runs behind
+    the records.
     """
 
     system: System
@@ -62,6 +63,7 @@ class Windows:
     modes: list[tuple[int, ...]]
     colour: FloatArray
     loss: float = np.inf
+    reach: float = 1.0
     pieces: list[Window] = field(default_factory=list)
     steady: tuple[SteadyReadings, ...] = ()
 
@@ -97,6 +99,11 @@ class Windows:
     @cached_property
     def readouts(self) -> list[Observable]:
         return [Observable(self.system, name, self.marcher.flow.places) for name in self.sensors]
+
+    @cached_property
+    def jumps(self) -> bool:
+        """Mark of readings of which one may jump at a transition."""
+        return any(one.jumps for one in self.readouts)
 
     @cached_property
     def starts(self) -> FloatArray:
@@ -141,10 +148,10 @@ class Windows:
     def motion(
         self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False
     ) -> SampledRun | None:
-        """The motion as the readings tell it: no farther than their step from a transition at which one jumps, they
-        stand on the side that they fit."""
+        """The motion as the readings tell it: within reach of a transition at which one jumps, they stand on the side
+        that they fit."""
         found = self.marched(theta, window, start)
-        if found is not None and len(found.log.crossing_time):
+        if found is not None and len(found.log.crossing_time) and self.jumps:
             found = self._sided(theta, window, found)
         if found is None or not derivatives:
             return found
@@ -165,16 +172,16 @@ class Windows:
             """Sum of the squared residuals of each sample, over the noise."""
             left = window.values[window.readings] - self.readings(theta, window, one, False)[0]
             squares = (left / self.noise[window.readings[1]]) ** 2
-            return np.bincount(self.sampled(theta, window, one), squares, len(one.time)).astype(float)
+            return np.bincount(self.samples_of(theta, window, one), squares, len(one.time)).astype(float)
 
-        return sided(self.marcher.flow, values, motion, self.steps[window.record].min(), jumps, misfit)
+        return sided(self.marcher.flow, values, motion, self.reach * self.steps[window.record].min(), jumps, misfit)
 
     def _values(self, theta: FloatArray, window: Window) -> FloatArray:
         values = self.at(theta, window.record).values
         assert values is not None
         return values
 
-    def sampled(self, theta: FloatArray, window: Window, motion: SampledRun) -> IntArray:
+    def samples_of(self, theta: FloatArray, window: Window, motion: SampledRun) -> IntArray:
         """The sample of the motion of each reading."""
         (k, c), there = window.readings, self.at(theta, window.record)
         shift = motion.time[0] - self.instants(theta, window)[0]
@@ -217,7 +224,7 @@ class Windows:
         n, a, p = self.marcher.flow.n, len(u.active), len(window.which)
         period, of_period = self.marcher.flow.period(values)
         predicted, table = np.empty(len(k)), np.zeros((len(k) if slopes else 0, p + n))
-        of_reading = self.sampled(theta, window, motion)
+        of_reading = self.samples_of(theta, window, motion)
         for j, (name, sensor) in enumerate(sensors.items()):
             rows = np.flatnonzero(c == j) if len(sensors) > 1 else slice(None)
             at = of_reading[rows]
