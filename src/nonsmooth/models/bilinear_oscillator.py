@@ -8,7 +8,7 @@ without damping that leaves them with the speed v has the period
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,18 +16,6 @@ from nonsmooth.system.derived.elements import Backlash
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
-
-
-def _base(t: Any, p: Any) -> Any:
-    return -p.A * p.omega**2 * np.cos(p.omega * t)
-
-
-def _damping(p: Any) -> Any:
-    return 2 * p.zeta
-
-
-def _mirror(u: Any) -> Any:
-    return -u.x, -u.v_x
 
 
 def bilinear_oscillator(**parameters: float) -> System:
@@ -66,13 +54,13 @@ def bilinear_oscillator(**parameters: float) -> System:
     """
     from nonsmooth.system.derived.mechanical import mechanical
 
-    system = mechanical(
+    return mechanical(
         1.0,
-        _damping,
+        lambda p: 2 * p.zeta,
         1.0,
         name="bilinear oscillator",
         coordinates="x",
-        base=_base,
+        base=lambda t, p: -p.A * p.omega**2 * np.cos(p.omega * t),
         parameters={
             "zeta": (0.05, "", r"\zeta"),
             "beta": (10.0, "", r"\beta"),
@@ -81,6 +69,5 @@ def bilinear_oscillator(**parameters: float) -> System:
             "omega": (0.7, "", r"\omega"),
         },
         elements={"springs": Backlash(at="x", half_width="g", stiffness="beta")},
-        symmetry=(_mirror, 0.5, {"springs_above": "springs_below", "springs_below": "springs_above"}),
-    )
-    return system.with_parameters(parameters) if parameters else system
+        symmetry=(lambda u: (-u.x, -u.v_x), 0.5, {"springs_above": "springs_below", "springs_below": "springs_above"}),
+    ).with_parameters(parameters)

@@ -47,7 +47,7 @@ def border_collision(**parameters: float) -> Map:
     """
     from nonsmooth.system.derived.maps import Branch, Map
 
-    system = Map(
+    return Map(
         name="border-collision normal form",
         states={"x": "", "y": ""},
         parameters={
@@ -58,5 +58,4 @@ def border_collision(**parameters: float) -> Map:
             "mu": (0.1, "", r"\mu"),
         },
         branches=[Branch(_left, when="x < 0"), Branch(_right, when="x > 0")],
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -47,10 +47,9 @@ def bouncing_ball_map(**parameters: float) -> Map:
     """
     from nonsmooth.system.derived.maps import Branch, Map
 
-    system = Map(
+    return Map(
         name="bouncing ball map",
         states={"theta": "", "v": ""},
         parameters={"alpha": (0.5, "", r"\alpha"), "gamma": (4.0, "", r"\gamma")},
         branches=[Branch(_bounce)],
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

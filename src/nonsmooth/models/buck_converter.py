@@ -23,10 +23,6 @@ def _open(t: Any, u: Any, p: Any) -> Any:
     return (u.i - u.v / p.R) / p.C, -u.v / p.L, (p.V_high - p.V_low) / p.T
 
 
-def _sawtooth_above(t: Any, u: Any, p: Any) -> Any:
-    return u.ramp - p.gain * (u.v - p.V_ref)
-
-
 def _fall(t: Any, u: Any, p: Any) -> Any:
     return u.v, u.i, p.V_low
 
@@ -56,7 +52,7 @@ def buck_converter(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="buck converter",
         states={"v": "V", "i": "A", "ramp": "V"},
         parameters={
@@ -71,7 +67,7 @@ def buck_converter(**parameters: float) -> System:
             "V_high": (8.2, "V", r"V_{\mathrm{high}}"),
         },
         modes={"open": _open, "closed": _closed},
-        indicators={"sawtooth_above": _sawtooth_above},
+        indicators={"sawtooth_above": lambda t, u, p: u.ramp - p.gain * (u.v - p.V_ref)},
         transitions=[
             Transition("open", "open", at=0.0, reset=_fall),
             Transition("closed", "open", at=0.0, reset=_fall),
@@ -80,5 +76,4 @@ def buck_converter(**parameters: float) -> System:
         ],
         period=lambda p: p.T,
         scale={"v": 10.0, "i": 1.0, "ramp": 10.0},
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -21,18 +21,6 @@ def _inner(t: Any, u: Any, p: Any) -> Any:
     return p.alpha * (y - p.a * x), x - y + z, -p.beta * y
 
 
-def _voltage(t: Any, u: Any, p: Any) -> Any:
-    return u.x
-
-
-def _steeper(t: Any, u: Any, p: Any) -> Any:
-    return p.b - p.a
-
-
-def _mirror(u: Any) -> Any:
-    return -u.x, -u.y, -u.z
-
-
 def chua_circuit(**parameters: float) -> System:
     r"""Return the circuit of Chua with its piecewise-linear diode.
 
@@ -67,12 +55,15 @@ def chua_circuit(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="Chua's circuit",
         states=["x", "y", "z"],
         modes={"inner": _inner},
         parameters={"alpha": (9.0, "", r"\alpha"), "beta": (100 / 7, "", r"\beta"), "a": -1 / 7, "b": 2 / 7},
-        elements={"diode": Backlash(displacement=_voltage, on={"x": "alpha"}, half_width=1.0, stiffness=_steeper)},
-        symmetry=(_mirror, 0.0, {"diode_above": "diode_below", "diode_below": "diode_above"}),
-    )
-    return system.with_parameters(parameters) if parameters else system
+        elements={
+            "diode": Backlash(
+                displacement=lambda t, u, p: u.x, on={"x": "alpha"}, half_width=1.0, stiffness=lambda t, u, p: p.b - p.a
+            )
+        },
+        symmetry=(lambda u: (-u.x, -u.y, -u.z), 0.0, {"diode_above": "diode_below", "diode_below": "diode_above"}),
+    ).with_parameters(parameters)

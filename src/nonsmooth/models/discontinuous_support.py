@@ -42,10 +42,6 @@ def _force(t: Any, u: Any, p: Any) -> Any:  # f_s below Eq. 2
     return -(p.k_s * (u.x - p.g) + p.c_s * u.v)
 
 
-def _no_force(t: Any, u: Any, p: Any) -> Any:
-    return 0.0
-
-
 def _entering_force(t: Any, u: Any, p: Any) -> Any:
     """Last two terms of Eq. 8a, and its c_s v: the force grows linearly from 0 to that of contact."""
     q = (u.x - p.g + p.eta) / (2 * p.eta)
@@ -64,10 +60,6 @@ def _leaving_force(t: Any, u: Any, p: Any) -> Any:
 def _leaving(t: Any, u: Any, p: Any) -> Any:  # Eq. 8b
     x, v = u
     return v, (p.rho * np.cos(p.omega * t) - 2 * p.k * x - p.c * v + _leaving_force(t, u, p)) / p.m
-
-
-def _velocity(t: Any, u: Any, p: Any) -> Any:
-    return u.v
 
 
 def discontinuous_support(**parameters: float) -> System:
@@ -103,7 +95,7 @@ def discontinuous_support(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="discontinuous support",
         states={"x": "m", "v": "m/s"},
         parameters={
@@ -122,13 +114,12 @@ def discontinuous_support(**parameters: float) -> System:
             Transition("free", "contact", when="penetration > 0 and separation < 0"),
             Transition("contact", "free", when="separation > 0"),
         ],
-        outputs={"contact_force": ({"free": _no_force, "contact": _force}, "N")},
+        outputs={"contact_force": ({"free": lambda t, u, p: 0.0, "contact": _force}, "N")},
         scale={"x": 1e-3, "v": 1e-2},
         bands={
             "penetration": Band(
-                _entering, write={"v_a": (_velocity, "m/s")}, outputs={"contact_force": _entering_force}
+                _entering, write={"v_a": (lambda t, u, p: u.v, "m/s")}, outputs={"contact_force": _entering_force}
             ),
             "separation": Band(_leaving, outputs={"contact_force": _leaving_force}),
         },
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

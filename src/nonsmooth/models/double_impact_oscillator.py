@@ -8,7 +8,7 @@ the next is 1 (saddle-node), -1 (loss of symmetry) or where the mass also grazes
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,22 +16,6 @@ from nonsmooth.system.derived.elements import Stop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
-
-
-def _force(t: Any, p: Any) -> Any:
-    return np.cos(p.omega * t)
-
-
-def _damping(p: Any) -> Any:
-    return p.c
-
-
-def _left(t: Any, u: Any, p: Any) -> Any:
-    return -p.g
-
-
-def _mirror(u: Any) -> Any:
-    return -u.x, -u.v_x
 
 
 def double_impact_oscillator(**parameters: float) -> System:
@@ -64,25 +48,24 @@ def double_impact_oscillator(**parameters: float) -> System:
     """
     from nonsmooth.system.derived.mechanical import mechanical
 
-    system = mechanical(
+    return mechanical(
         1.0,
-        _damping,
+        lambda p: p.c,
         1.0,
         name="double impact oscillator",
         coordinates="x",
-        forcing={"x": _force},
+        forcing={"x": lambda t, p: np.cos(p.omega * t)},
         parameters={"c": 0.0, "g": 0.5, "e": 0.6, "omega": (1.5, "", r"\omega")},
         elements={
             "right": Stop(at="x", position="g", restitution="e"),
-            "left": Stop(at="x", position=_left, side=-1, restitution="e"),
+            "left": Stop(at="x", position=lambda t, u, p: -p.g, side=-1, restitution="e"),
         },
         symmetry=(
-            _mirror,
+            lambda u: (-u.x, -u.v_x),
             0.5,
             {
                 "left_open_right_rest": "left_rest_right_open",
                 "left_rest_right_open": "left_open_right_rest",
             },
         ),
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

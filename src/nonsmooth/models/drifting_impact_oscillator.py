@@ -35,28 +35,12 @@ def _progress(t: Any, u: Any, p: Any) -> Any:
     return back, _drive(t, p) - 1, back
 
 
-def _gap(t: Any, u: Any, p: Any) -> Any:
-    return u.q + p.g - u.x
-
-
 def _force(t: Any, u: Any, p: Any) -> Any:
     return 2 * p.xi * u.y + u.q
 
 
-def _excess(t: Any, u: Any, p: Any) -> Any:
-    return 2 * p.xi * u.y + u.q - 1
-
-
 def _none(t: Any, u: Any, p: Any) -> Any:
     return 0.0
-
-
-def _slider(t: Any, u: Any, p: Any) -> Any:
-    return u.y + (u.q - 1) / (2 * p.xi)
-
-
-def _one(t: Any, u: Any, p: Any) -> Any:
-    return 1.0
 
 
 def drifting_impact_oscillator(**parameters: float) -> System:
@@ -96,12 +80,16 @@ def drifting_impact_oscillator(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="drifting impact oscillator",
         states=["x", "y", "q"],
         parameters={"a": 0.3, "b": 0.1, "xi": (0.1, "", r"\xi"), "omega": (0.1, "", r"\omega"), "g": 0.02},
         modes={"free": _free, "contact": _contact, "progress": _progress},
-        indicators={"gap": _gap, "force": _force, "excess": _excess},
+        indicators={
+            "gap": lambda t, u, p: u.q + p.g - u.x,
+            "force": _force,
+            "excess": lambda t, u, p: 2 * p.xi * u.y + u.q - 1,
+        },
         transitions=[
             Transition("free", "contact", when="gap < 0 and force > 0"),
             Transition("contact", "free", when="force < 0"),
@@ -109,8 +97,11 @@ def drifting_impact_oscillator(**parameters: float) -> System:
             Transition("progress", "contact", when="excess < 0"),
         ],
         outputs={
-            "contact_force": {"free": _none, "contact": _force, "progress": _one},
-            "slider_velocity": {"free": _none, "contact": _none, "progress": _slider},
+            "contact_force": {"free": _none, "contact": _force, "progress": lambda t, u, p: 1.0},
+            "slider_velocity": {
+                "free": _none,
+                "contact": _none,
+                "progress": lambda t, u, p: u.y + (u.q - 1) / (2 * p.xi),
+            },
         },
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

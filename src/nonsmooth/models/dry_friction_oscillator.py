@@ -33,14 +33,6 @@ def _forward(t: Any, u: Any, p: Any) -> Any:
     return u.v, _others(t, u, p) - p.f_k
 
 
-def _speed(t: Any, u: Any, p: Any) -> Any:
-    return u.v - p.v_b
-
-
-def _static(t: Any, u: Any, p: Any) -> Any:
-    return p.f_s / p.f_k
-
-
 def dry_friction_oscillator(**parameters: float) -> System:
     r"""Return the forced oscillator with dry friction.
 
@@ -67,13 +59,14 @@ def dry_friction_oscillator(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="dry friction oscillator",
         states={"x": "", "v": ""},
         parameters={"f_0": 1.0, "omega": 0.8, "f_k": 0.3, "f_s": 0.3, "zeta": 0.0, "v_b": 0.0},
         modes={"backward": _backward, "forward": _forward},
-        indicators={"speed": _speed},
-        transitions=[Surface("speed", below="backward", above="forward", mode="stick", static=_static)],
+        indicators={"speed": lambda t, u, p: u.v - p.v_b},
+        transitions=[
+            Surface("speed", below="backward", above="forward", mode="stick", static=lambda t, u, p: p.f_s / p.f_k)
+        ],
         outputs={"friction": {"backward": lambda t, u, p: p.f_k, "forward": lambda t, u, p: -p.f_k}},
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -7,7 +7,7 @@ F_a omega^2 = F_m sqrt((1 - omega^2)^2 + (2 zeta omega)^2).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,14 +15,6 @@ from nonsmooth.system.derived.elements import Backlash
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
-
-
-def _load(t: Any, p: Any) -> Any:
-    return p.F_m + p.F_a * p.omega**2 * np.cos(p.omega * t)
-
-
-def _damping(p: Any) -> Any:
-    return 2 * p.zeta
 
 
 def gear_pair(**parameters: float) -> System:
@@ -61,12 +53,12 @@ def gear_pair(**parameters: float) -> System:
     """
     from nonsmooth.system.derived.mechanical import mechanical
 
-    system = mechanical(
+    return mechanical(
         1.0,
-        _damping,
+        lambda p: 2 * p.zeta,
         0.0,
         name="gear pair",
-        forcing={"q": _load},
+        forcing={"q": lambda t, p: p.F_m + p.F_a * p.omega**2 * np.cos(p.omega * t)},
         parameters={
             "zeta": (0.05, "", r"\zeta"),
             "F_m": 0.1,
@@ -75,5 +67,4 @@ def gear_pair(**parameters: float) -> System:
             "omega": (0.5, "", r"\omega"),
         },
         elements={"teeth": Backlash(at="q", half_width="b", stiffness=1.0)},
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -8,7 +8,7 @@ quadratic equation for w.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,30 +16,6 @@ from nonsmooth.system.derived.elements import Stop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
-
-
-def _masses(p: Any) -> Any:
-    return [[1.0, 0.0], [0.0, p.mu]]
-
-
-def _damping(p: Any) -> Any:
-    return [[2 * p.zeta, 0.0], [0.0, 0.0]]
-
-
-def _force(t: Any, p: Any) -> Any:
-    return p.F * np.cos(p.omega * t)
-
-
-def _right(t: Any, u: Any, p: Any) -> Any:
-    return p.d / 2
-
-
-def _left(t: Any, u: Any, p: Any) -> Any:
-    return -p.d / 2
-
-
-def _mirror(u: Any) -> Any:
-    return -u.x, -u.y, -u.v_x, -u.v_y
 
 
 def impact_damper(**parameters: float) -> System:
@@ -77,13 +53,13 @@ def impact_damper(**parameters: float) -> System:
     """
     from nonsmooth.system.derived.mechanical import mechanical
 
-    system = mechanical(
-        _masses,
-        _damping,
+    return mechanical(
+        lambda p: [[1.0, 0.0], [0.0, p.mu]],
+        lambda p: [[2 * p.zeta, 0.0], [0.0, 0.0]],
         np.diag([1.0, 0.0]),
         name="impact damper",
         coordinates=["x", "y"],
-        forcing={"x": _force},
+        forcing={"x": lambda t, p: p.F * np.cos(p.omega * t)},
         parameters={
             "zeta": (0.01, "", r"\zeta"),
             "mu": (0.1, "", r"\mu"),
@@ -93,16 +69,15 @@ def impact_damper(**parameters: float) -> System:
             "omega": (1.0, "", r"\omega"),
         },
         elements={
-            "right": Stop(at={"y": 1, "x": -1}, position=_right, restitution="e"),
-            "left": Stop(at={"y": 1, "x": -1}, position=_left, side=-1, restitution="e"),
+            "right": Stop(at={"y": 1, "x": -1}, position=lambda t, u, p: p.d / 2, restitution="e"),
+            "left": Stop(at={"y": 1, "x": -1}, position=lambda t, u, p: -p.d / 2, side=-1, restitution="e"),
         },
         symmetry=(
-            _mirror,
+            lambda u: (-u.x, -u.y, -u.v_x, -u.v_y),
             0.5,
             {
                 "left_open_right_rest": "left_rest_right_open",
                 "left_rest_right_open": "left_open_right_rest",
             },
         ),
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -23,22 +23,6 @@ def _motion(t: Any, u: Any, p: Any) -> Any:
     return v1, v2, np.cos(p.omega * t) - 2 * p.zeta * v1 - x1 - p.eta_1 * x1**3 - p.mu * coupling, coupling
 
 
-def _upper(t: Any, u: Any, p: Any) -> Any:
-    return p.delta_1 - (u.x2 - u.x1)
-
-
-def _lower(t: Any, u: Any, p: Any) -> Any:
-    return p.delta_2 + (u.x2 - u.x1)
-
-
-def _on_second(t: Any, u: Any, p: Any) -> Any:
-    return 1 / p.mu
-
-
-def _on_second_back(t: Any, u: Any, p: Any) -> Any:
-    return -1 / p.mu
-
-
 def impact_duffing(**parameters: float) -> System:
     r"""Return the impact Duffing oscillator with two degrees of freedom.
 
@@ -76,7 +60,7 @@ def impact_duffing(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="impact Duffing",
         states=["x1", "x2", "v1", "v2"],
         modes={"motion": _motion},
@@ -93,8 +77,15 @@ def impact_duffing(**parameters: float) -> System:
             "omega": (0.9, "", r"\omega"),
         },
         elements={
-            "upper": Stop(gap=_upper, on={"v1": 1.0, "v2": _on_second_back}, restitution="r"),
-            "lower": Stop(gap=_lower, on={"v1": -1.0, "v2": _on_second}, restitution="r"),
+            "upper": Stop(
+                gap=lambda t, u, p: p.delta_1 - (u.x2 - u.x1),
+                on={"v1": 1.0, "v2": lambda t, u, p: -1 / p.mu},
+                restitution="r",
+            ),
+            "lower": Stop(
+                gap=lambda t, u, p: p.delta_2 + (u.x2 - u.x1),
+                on={"v1": -1.0, "v2": lambda t, u, p: 1 / p.mu},
+                restitution="r",
+            ),
         },
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -6,7 +6,7 @@ U)^2), V = 1 / (1 - omega^2), U = sin(pi / omega) / (omega (1 + cos(pi / omega))
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,14 +14,6 @@ from nonsmooth.system.derived.elements import Coulomb, Stop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
-
-
-def _force(t: Any, p: Any) -> Any:
-    return np.cos(p.omega * t)
-
-
-def _damping(p: Any) -> Any:
-    return 2 * p.zeta
 
 
 def impact_friction_oscillator(**parameters: float) -> System:
@@ -56,17 +48,16 @@ def impact_friction_oscillator(**parameters: float) -> System:
     """
     from nonsmooth.system.derived.mechanical import mechanical
 
-    system = mechanical(
+    return mechanical(
         1.0,
-        _damping,
+        lambda p: 2 * p.zeta,
         1.0,
         name="impact-friction oscillator",
         coordinates="x",
-        forcing={"x": _force},
+        forcing={"x": lambda t, p: np.cos(p.omega * t)},
         parameters={"zeta": (0.0, "", r"\zeta"), "f": 0.2, "g": 1.0, "e": 0.7, "omega": (0.8, "", r"\omega")},
         elements={
             "support": Coulomb(at="x", friction="f"),
             "stop": Stop(at="x", position="g", restitution="e"),
         },
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -24,14 +24,6 @@ def _motion(t: Any, u: Any, p: Any) -> Any:
     return v, p.A * np.cos(p.omega * t) - p.k * x - p.c * v
 
 
-def _stop(t: Any, u: Any, p: Any) -> Any:
-    return u.x - p.d
-
-
-def _rebound(t: Any, u: Any, p: Any) -> Any:
-    return u.x, -p.e * u.v
-
-
 def impact_oscillator(**parameters: float) -> System:
     r"""Return the impact oscillator: a forced mass on a spring that hits a rigid stop.
 
@@ -54,12 +46,11 @@ def impact_oscillator(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="impact oscillator",
         states={"x": "", "v": ""},
         parameters={"k": 1.0, "c": 0.1, "omega": 1.0, "d": 1.0, "e": 0.8, "A": 1.0},
         modes={"motion": _motion},
-        indicators={"stop": _stop},
-        transitions=[Transition("motion", "motion", when="stop > 0", reset=_rebound)],
-    )
-    return system.with_parameters(parameters) if parameters else system
+        indicators={"stop": lambda t, u, p: u.x - p.d},
+        transitions=[Transition("motion", "motion", when="stop > 0", reset=lambda t, u, p: (u.x, -p.e * u.v))],
+    ).with_parameters(parameters)

@@ -23,14 +23,6 @@ def _cart(t: Any, u: Any, p: Any) -> Any:
     return v, (push - x - x * v**2) / (1 + x**2) - 2 * p.zeta * v
 
 
-def _gap(t: Any, u: Any, p: Any) -> Any:
-    return p.d - u.x
-
-
-def _stop(t: Any, u: Any, p: Any) -> Any:
-    return -1 / (1 + u.x**2)
-
-
 def parabolic_track(**parameters: float) -> System:
     r"""Return the cart on a shaken parabolic track with a rigid stop, after Todd and Virgin (1997).
 
@@ -67,7 +59,7 @@ def parabolic_track(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="parabolic track",
         states=["x", "v"],
         modes={"cart": _cart},
@@ -78,6 +70,7 @@ def parabolic_track(**parameters: float) -> System:
             "d": 0.2,
             "e": 0.6,
         },
-        elements={"stop": Stop(gap=_gap, on={"v": _stop}, restitution="e")},
-    )
-    return system.with_parameters(parameters) if parameters else system
+        elements={
+            "stop": Stop(gap=lambda t, u, p: p.d - u.x, on={"v": lambda t, u, p: -1 / (1 + u.x**2)}, restitution="e")
+        },
+    ).with_parameters(parameters)

@@ -26,10 +26,6 @@ def _plant(sign: int) -> Any:
     return field
 
 
-def _input(t: Any, u: Any, p: Any) -> Any:
-    return u.x1
-
-
 def relay_feedback(**parameters: float) -> System:
     r"""Return the relay feedback system: a linear plant whose input switches with the sign of its output.
 
@@ -53,13 +49,12 @@ def relay_feedback(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="relay feedback",
         states=["x1", "x2", "x3"],
         parameters={"xi": 0.05, "omega": 25.0, "sigma": 1.0},
         modes={"plus": _plant(1), "minus": _plant(-1)},
-        indicators={"level": _input},
+        indicators={"level": lambda t, u, p: u.x1},
         transitions=[Surface("level", below="plus", above="minus", mode="sliding")],
         outputs={"relay": {"plus": lambda t, u, p: 1.0, "minus": lambda t, u, p: -1.0}},
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

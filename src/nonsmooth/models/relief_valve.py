@@ -23,18 +23,6 @@ def _open(t: Any, u: Any, p: Any) -> Any:
     return y2, -p.k * y2 - (y1 + p.delta) + y3, p.beta * (p.q - y1 * np.sqrt(y3))
 
 
-def _seat(t: Any, u: Any, p: Any) -> Any:
-    return u.y1
-
-
-def _lift_velocity(t: Any, u: Any, p: Any) -> Any:
-    return u.y2
-
-
-def _rebound(t: Any, u: Any, p: Any) -> Any:
-    return 0.0, -p.r * u.y2, u.y3
-
-
 def relief_valve(**parameters: float) -> System:
     r"""Return the relief valve: an autonomous nonlinear system with impacts.
 
@@ -63,7 +51,7 @@ def relief_valve(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="relief valve",
         states={"y1": "", "y2": "", "y3": ""},
         parameters={
@@ -74,8 +62,7 @@ def relief_valve(**parameters: float) -> System:
             "q": 5.0,
         },
         modes={"open": _open},
-        indicators={"seat": _seat, "lift_velocity": _lift_velocity},
-        transitions=[Transition("open", "open", when="seat < 0", reset=_rebound)],
+        indicators={"seat": lambda t, u, p: u.y1, "lift_velocity": lambda t, u, p: u.y2},
+        transitions=[Transition("open", "open", when="seat < 0", reset=lambda t, u, p: (0.0, -p.r * u.y2, u.y3))],
         scale={"y1": 1.0, "y2": 1.0, "y3": 10.0},
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -34,18 +34,6 @@ def _radius(u: Any) -> Any:
     return np.sqrt(u.x**2 + u.y**2)
 
 
-def _gap(t: Any, u: Any, p: Any) -> Any:
-    return p.R_0 - _radius(u)
-
-
-def _on_x(t: Any, u: Any, p: Any) -> Any:
-    return -(u.x - p.mu * u.y) / _radius(u)
-
-
-def _on_y(t: Any, u: Any, p: Any) -> Any:
-    return -(u.y + p.mu * u.x) / _radius(u)
-
-
 def rubbing_rotor(**parameters: float) -> System:
     r"""Return the Jeffcott rotor that rubs its stator.
 
@@ -84,7 +72,7 @@ def rubbing_rotor(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="rubbing rotor",
         states=["x", "y", "v_x", "v_y"],
         modes={"disc": _disc},
@@ -95,6 +83,14 @@ def rubbing_rotor(**parameters: float) -> System:
             "mu": (0.2, "", r"\mu"),
             "omega": (0.2, "", r"\omega"),
         },
-        elements={"stator": ElasticStop(gap=_gap, on={"v_x": _on_x, "v_y": _on_y}, stiffness=1.0)},
-    )
-    return system.with_parameters(parameters) if parameters else system
+        elements={
+            "stator": ElasticStop(
+                gap=lambda t, u, p: p.R_0 - _radius(u),
+                on={
+                    "v_x": lambda t, u, p: -(u.x - p.mu * u.y) / _radius(u),
+                    "v_y": lambda t, u, p: -(u.y + p.mu * u.x) / _radius(u),
+                },
+                stiffness=1.0,
+            )
+        },
+    ).with_parameters(parameters)

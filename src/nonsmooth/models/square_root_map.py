@@ -52,10 +52,9 @@ def square_root_map(**parameters: float) -> Map:
     """
     from nonsmooth.system.derived.maps import Branch, Map
 
-    system = Map(
+    return Map(
         name="square-root map",
         states={"x": ""},
         parameters={"lam": (0.2, "", r"\lambda"), "mu": (0.05, "", r"\mu")},
         branches=[Branch(_free, when="x < 0"), Branch(_impact, when="x > 0")],
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

@@ -27,10 +27,6 @@ def _ahead(t: Any, u: Any, p: Any) -> Any:
     return v, -p.F / (1 + p.delta * (v - p.v_b)) - x - p.c * v
 
 
-def _relative(t: Any, u: Any, p: Any) -> Any:
-    return u.v - p.v_b
-
-
 def stick_slip_belt(**parameters: float) -> System:
     r"""Return the friction oscillator on a belt: self-excited stick-slip vibration.
 
@@ -56,12 +52,12 @@ def stick_slip_belt(**parameters: float) -> System:
     """
     from nonsmooth.system.system import System
 
-    system = System(
+    return System(
         name="stick-slip oscillator on a belt",
         states={"x": "", "v": ""},
         parameters={"F": 1.0, "delta": 3.0, "v_b": 0.2, "c": 0.0},
         modes={"dragged": _dragged, "ahead": _ahead},
-        indicators={"relative": _relative},
+        indicators={"relative": lambda t, u, p: u.v - p.v_b},
         transitions=[Surface("relative", below="dragged", above="ahead", mode="stick")],
         outputs={
             "friction": {
@@ -69,5 +65,4 @@ def stick_slip_belt(**parameters: float) -> System:
                 "ahead": lambda t, u, p: -p.F / (1 + p.delta * (u.v - p.v_b)),
             }
         },
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)

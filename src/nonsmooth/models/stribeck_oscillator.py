@@ -16,14 +16,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 
-def _force(t: Any, p: Any) -> Any:
-    return p.u_0 * np.cos(p.omega * t)
-
-
-def _damping(p: Any) -> Any:
-    return 2 * p.D
-
-
 def _stribeck(v: Any, p: Any) -> Any:
     return (p.mu_s - p.mu_k) / (1 + p.kappa * v) + p.mu_k + p.mu_v * v**2
 
@@ -63,13 +55,13 @@ def stribeck_oscillator(**parameters: float) -> System:
     """
     from nonsmooth.system.derived.mechanical import mechanical
 
-    system = mechanical(
+    return mechanical(
         1.0,
-        _damping,
+        lambda p: 2 * p.D,
         1.0,
         name="Stribeck oscillator",
         coordinates="x",
-        forcing={"x": _force},
+        forcing={"x": lambda t, p: p.u_0 * np.cos(p.omega * t)},
         parameters={
             "D": 0.0,
             "mu_s": (0.4, "", r"\mu_s"),
@@ -81,5 +73,4 @@ def stribeck_oscillator(**parameters: float) -> System:
             "omega": (0.6, "", r"\omega"),
         },
         elements={"belt": Coulomb(at="x", belt="v_b", friction=_stribeck)},
-    )
-    return system.with_parameters(parameters) if parameters else system
+    ).with_parameters(parameters)
