@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.diagrams.spectrum import evaluated, kaplan_yorke
+from nonsmooth.diagrams.spectrum import FrameGrowth, evaluated, kaplan_yorke
 from nonsmooth.elements import Coulomb, Stop
 
 DEFECT = 1e-10
@@ -419,7 +419,7 @@ def test_a_chatter_beside_a_mass_that_sticks_leaves_its_place_alone(method: str)
 
 def test_what_is_lost_has_no_error_and_what_is_not_known_has_none_either() -> None:
     sums = np.tile([-np.inf, np.nan, -1.0], (32, 1))
-    found = evaluated(3, sums.mean(axis=0), sums, 32, 1.0, 0.0, 1.0, 0, forced=True)
+    found = evaluated(3, FrameGrowth(sums, 0.0, 0.0, 1.0, 0), 32, 1.0, forced=True)
     assert found.exponents.tolist()[:2] == [-1.0, -np.inf] and found.error.tolist()[:2] == [0.0, 0.0]
     assert np.isnan(found.exponents[2]) and np.isnan(found.error[2])
 

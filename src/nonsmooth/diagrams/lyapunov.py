@@ -19,6 +19,7 @@ from nonsmooth.diagrams.spectrum import (
     ALIGN,
     BATCHES,
     GOOD,
+    FrameGrowth,
     Spectrum,
     at_rest,
     batch_ends,
@@ -26,7 +27,7 @@ from nonsmooth.diagrams.spectrum import (
     failed_spectrum,
     spectrum_along,
 )
-from nonsmooth.flow.engines.devices import on_gpu
+from nonsmooth.flow.engines.devices import batch_size, on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import beyond_stops, refuse_beyond_stops, solve_error, warn_if_slow
@@ -236,30 +237,17 @@ def _on_gpu(
     from nonsmooth.diagrams.lyapunov_cuda import growth_on_gpu
 
     edges = batch_ends(count) if count >= BATCHES else np.array([0, count], dtype=np.int64)
-    growth, sums, status = growth_on_gpu(
-        engine, points, state.u, int(state.counters[0]), system.scale_vector(), min(ALIGN, wait), wait, edges, advance
-    )
-    found = []
-    for i, logs in enumerate(growth):
-        unit = float(system.period_at(points[i]) or np.nan)
-        if status[i] not in GOOD:
-            found.append(failed_spectrum(2, count * unit, int(status[i])))
-            continue
-        total, demanded = float(logs.sum()), float(sums[i, 0] + sums[i, 1])
-        defect = 0.0 if total == demanded else total - demanded
-        found.append(
-            evaluated(
-                2,
-                logs.sum(axis=0) / (count * unit),
-                logs if count >= BATCHES else None,
-                count,
-                unit,
-                defect,
-                float(sums[i, 3]),
-                int(status[i]),
-                True,
-            )
-        )
+    mode, found = int(state.counters[0]), list[Spectrum]()
+    for some in np.split(points, range(batch_size(), len(points), batch_size())):
+        growth = growth_on_gpu(engine, some, state.u, mode, system.scale_vector(), min(ALIGN, wait), wait, edges)
+        for at, logs, sums, status in zip(some, *growth, strict=True):
+            unit = float(system.period_at(at) or np.nan)
+            if status in GOOD:
+                grown = FrameGrowth(logs, float(sums[0]), float(sums[1]), float(sums[3]), int(status))
+                found.append(evaluated(2, grown, count, unit, forced=True))
+            else:
+                found.append(failed_spectrum(2, count * unit, int(status)))
+        advance(len(some))
     return found
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.devices import StatesOnGpu, batch_size
+from nonsmooth.flow.engines.devices import StatesOnGpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.engines.gpu import PlanarOnGpu
 from nonsmooth.flow.engines.linear import PlanarEngine
@@ -22,7 +22,6 @@ def growth_on_gpu(
     align: int,
     wait: int,
     edges: IntArray,
-    advance: Any,
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """Growth of the frames of P trajectories that begin at one start, at the phase 0 of the forcing.
 
@@ -32,8 +31,6 @@ def growth_on_gpu(
         Forcing periods passed over; in the last ``align`` of them the frame turns into the directions of growth.
     edges : array (B + 1,)
         Ends of the batches of time, in periods, beginning with 0.
-    advance : callable
-        Told how many trajectories are done.
 
     Returns
     -------
@@ -43,25 +40,6 @@ def growth_on_gpu(
         As :class:`nonsmooth.kernels.hybrid.records.Growth` says.
     status : array (P,)
     """
-    parts, size = [], batch_size()
-    for first in range(0, len(points), size):
-        some = points[first : first + size]
-        parts.append(_batch(engine, some, start, mode, scale, align, wait, edges))
-        advance(len(some))
-    growth, sums, status = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return growth, sums, status
-
-
-def _batch(
-    engine: PlanarEngine,
-    points: FloatArray,
-    start: FloatArray,
-    mode: int,
-    scale: FloatArray,
-    align: int,
-    wait: int,
-    edges: IntArray,
-) -> tuple[FloatArray, FloatArray, IntArray]:
     n = len(points)
     gpu = PlanarOnGpu(engine, points, Section())
     module, to_device = gpu.growth(), gpu.cuda.to_device

@@ -40,9 +40,9 @@ FINEST = 1e-11  # and no coarser than this
 
 @dataclass
 class FrameGrowth:
-    """Growth of a frame over K units of time."""
+    """Growth of a frame over K units, or batches, of time."""
 
-    logarithms: FloatArray  # (K, n) by unit of time; minus infinity where a direction was lost
+    logarithms: FloatArray  # (K, n); minus infinity where a direction was lost
     divergence: float  # integral of div f
     determinants: float  # sum of log|det S|
     nearest: float  # least |h'| / (|h_z| |f|) of all crossings
@@ -235,13 +235,10 @@ def spectrum_along(
     if period is not None:
         state.clock[2] = period
     used = int(frame.active.sum())
-    logs = growth.logarithms[:, :used]
+    growth.logarithms = growth.logarithms[:, :used]
     if lost:
-        logs[:, used - lost :], growth.determinants = -np.inf, -np.inf
-    batches = np.add.reduceat(logs, batch_ends(count)[:-1]) if count >= BATCHES else None
-    found = evaluated(
-        n, logs.mean(axis=0) / unit, batches, count, unit, growth.defect, growth.nearest, status, period is not None
-    )
+        growth.logarithms[:, used - lost :], growth.determinants = -np.inf, -np.inf
+    found = evaluated(n, growth, count, unit, period is not None)
     if growth.beside and order_matters(system, engine, values, state, unit * np.ceil(2 * count / growth.beside)):
         found = replace(found, of_one_order=True)
     return at_rest(found, system, values, begun, state)
@@ -306,41 +303,26 @@ def failed_spectrum(n: int, elapsed: float, status: int) -> Spectrum:
     return Spectrum(nan, nan, np.full((BATCHES, n), np.nan), np.nan, np.nan, np.nan, elapsed, status)
 
 
-def evaluated(
-    n: int,
-    mean: FloatArray,
-    batches: FloatArray | None,
-    count: int,
-    unit: float,
-    defect: float,
-    nearest: float,
-    status: int,
-    forced: bool,
-) -> Spectrum:
-    """Exponents from the mean growth per unit time, their errors from that of the batches."""
-    used = len(mean)
+def evaluated(n: int, growth: FrameGrowth, count: int, unit: float, forced: bool) -> Spectrum:
+    """Exponents from the mean growth per unit time of ``count`` units, their errors from that of the batches."""
+    logs, elapsed = growth.logarithms, count * unit
+    used, mean = logs.shape[1], logs.sum(axis=0) / elapsed
     exponents, error, running = np.full(n, np.nan), np.full(n, np.nan), np.full((BATCHES, n), np.nan)
     order = np.argsort(-mean, kind="stable")
     exponents[:used] = mean[order]
-    edges = batch_ends(count)
-    if batches is not None:
+    if count >= BATCHES:
+        edges = batch_ends(count)
         with np.errstate(invalid="ignore"):
-            sums = batches[:, order]
+            sums = (logs if len(logs) == BATCHES else np.add.reduceat(logs, edges[:-1]))[:, order]
             means = sums / (np.diff(edges)[:, None] * unit)
             error[:used] = means.std(axis=0, ddof=1) / np.sqrt(BATCHES)
             running[:, :used] = np.cumsum(sums, axis=0) / (edges[1:, None] * unit)
         error[:used][np.isinf(exponents[:used])] = 0.0
     # In an autonomous system one exponent is zero, and its estimate of the order of 1/t.
-    zero = 0.0 if forced else float(np.nanmax([0.0, *(3 * error[:used])]) + 3.0 / (count * unit))
+    zero = 0.0 if forced else float(np.nanmax([0.0, *(3 * error[:used])]) + 3.0 / elapsed)
+    dimension = kaplan_yorke(exponents[:used], zero)
     return Spectrum(
-        exponents,
-        error,
-        running,
-        defect / (count * unit),
-        kaplan_yorke(exponents[:used], zero),
-        nearest,
-        count * unit,
-        status,
+        exponents, error, running, growth.defect / elapsed, dimension, growth.nearest, elapsed, growth.status
     )
 
 
