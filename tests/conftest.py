@@ -164,8 +164,9 @@ def responded(labels: Labels) -> xr.Dataset:
         starts=np.zeros((1, 2)),
         squeeze=("start",),
     )
-    jumps = {"value": [JUMP_UP, JUMP_DOWN], "direction": ["up", "down"], "variable": ["x"] * 2, "start": [0] * 2}
-    return schema.response(base, amplitude=x, jumps=jumps)
+    sides = {"variable": "x", "start": 0, "step": 0.05, "before": 0.05, "after": 0.01}
+    jumps = [{"value": JUMP_UP, "direction": "up", **sides}, {"value": JUMP_DOWN, "direction": "down", **sides}]
+    return schema.response(base, jumps)
 
 
 @pytest.fixture

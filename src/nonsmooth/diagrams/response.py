@@ -81,18 +81,16 @@ def _response(system: System, swept: xr.Dataset, parameter: str) -> xr.Dataset:
     from nonsmooth.results.provenance import attribute, read_provenance, with_short_record
     from nonsmooth.results.schema import response
 
-    full = [("direction", 1), ("start", 1), (parameter, swept.sizes[parameter]), ("state", swept.sizes["state"])]
-    half = 0.5 * (swept["maximum"] - swept["minimum"])
-    expanded = half.expand_dims([dim for dim, _ in full if dim not in half.dims]).transpose(*[dim for dim, _ in full])
-    amplitude = expanded.values
-    heights = {str(state): amplitude[..., i] for i, state in enumerate(swept["state"].values)}
-    for output in system.outputs:
-        if f"{output}_maximum" in swept:
-            range_ = swept[f"{output}_maximum"] - swept[f"{output}_minimum"]
-            added = [dim for dim, _ in full[:3] if dim not in range_.dims]
-            heights[output] = 0.5 * range_.expand_dims(added).transpose(*[dim for dim, _ in full[:3]]).values
+    def half(prefix: str = "") -> FloatArray:
+        """Half a range over directions, starts and values, also where the sweep has one direction or start."""
+        size = 0.5 * (swept[f"{prefix}maximum"] - swept[f"{prefix}minimum"])
+        added = [dim for dim in ("direction", "start") if dim not in size.dims]
+        return np.asarray(size.expand_dims(added).transpose("direction", "start", parameter, ...).values)
+
+    heights = dict(zip(swept["state"].values.tolist(), np.moveaxis(half(), -1, 0), strict=True))
+    heights |= {output: half(f"{output}_") for output in system.outputs if f"{output}_maximum" in swept}
     x = np.asarray(swept[parameter].values, dtype=float)
-    rows = [
+    jumps = [
         {
             "variable": name,
             "value": 0.5 * (x[a] + x[b]),
@@ -109,19 +107,8 @@ def _response(system: System, swept: xr.Dataset, parameter: str) -> xr.Dataset:
         for i, j in jumps_in(x[order], height[d, k, order])
         for a, b in [(order[i], order[j])]
     ]
-    kinds = {
-        "variable": str,
-        "value": float,
-        "step": float,
-        "direction": str,
-        "start": int,
-        "before": float,
-        "after": float,
-    }
-    jumps: dict[str, Any] = {key: np.array([row[key] for row in rows], dtype=kind) for key, kind in kinds.items()}
-    result = response(swept, amplitude=amplitude, jumps=jumps)
     record = read_provenance(swept) | {"verb": "frequency_response"}
-    return with_short_record(result.assign_attrs(attribute(record)))
+    return with_short_record(response(swept, jumps).assign_attrs(attribute(record)))
 
 
 def jumps_in(x: FloatArray, amplitude: FloatArray) -> list[tuple[int, int]]:

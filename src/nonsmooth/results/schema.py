@@ -186,10 +186,16 @@ _POINTS = table(
     ("mode", "start iterate", "mode", "mode"),
     ("status", "start", "status", ""),
 )
-_JUMPS = {
-    "direction": "direction in which the jump is met",
-    "variable": "state or output whose amplitude jumps",
-}
+_JUMP = table(
+    ("variable", "jump", "text", "state or output whose amplitude jumps"),
+    ("value", "jump", "", "value at the jump"),
+    ("step", "jump", "", "step at the jump"),
+    ("direction", "jump", "text", "direction in which the jump is met"),
+    ("start", "jump", "place", "start of the jump"),
+    ("before", "jump", "", "before of the jump"),
+    ("after", "jump", "", "after of the jump"),
+    before="jump_",
+)
 
 
 def trajectory(
@@ -264,26 +270,17 @@ def sweep(
     return result.transpose(parameter, "direction", "start", ...).squeeze(list(squeeze))
 
 
-def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, ArrayLike]) -> xr.Dataset:
-    """The result of ``frequency_response``: the sweep with ``amplitude`` and its jumps.
-
-    ``amplitude`` has the dims of ``maximum``, in the sweep's builder order (direction, start, parameter, state).
-    ``jumps`` holds ``value`` (J,) and ``direction`` (J,), and may hold further numbers per jump, such as
-    ``before`` and ``after`` (amplitudes on its two sides): they become ``jump_value``, ``jump_direction``, ...
-    """
-    maximum = swept["maximum"]
-    parameter = str(maximum.dims[0])
-    full = ("direction", "start", parameter, "state")
-    dropped = tuple(i for i, dim in enumerate(full) if dim not in maximum.dims)
-    heights = xr.DataArray(floats(amplitude).squeeze(dropped), dims=[dim for dim in full if dim in maximum.dims])
-    variables: dict[str, Any] = {
-        "amplitude": heights.transpose(*maximum.dims).assign_attrs(long_name="half the peak-to-peak value")
-    }
-    for name, values in jumps.items():
-        told = {"long_name": _JUMPS.get(name, f"{name} of the jump")}
-        if name in ("value", "step"):
-            told = {"long_name": f"{parameter}, {name} at the jump", "units": swept[parameter].attrs.get("units", "1")}
-        variables[f"jump_{name}"] = ("jump", np.array(values, dtype=str if name in _JUMPS else None), told)
+def response(swept: xr.Dataset, jumps: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+    """The result of ``frequency_response``: the sweep with its amplitudes and jumps."""
+    parameter = swept[swept["maximum"].dims[0]]
+    amplitude = 0.5 * (swept["maximum"] - swept["minimum"])
+    variables: dict[str, Any] = {"amplitude": amplitude.assign_attrs(long_name="half the peak-to-peak value")}
+    for column in _JUMP:
+        of_parameter = column.field in ("value", "step")
+        words = f"{parameter.name}, {column.words}" if of_parameter else column.words
+        unit = parameter.attrs.get("units", "1") if of_parameter else None
+        values = typed(column, [jump[column.field] for jump in jumps])
+        variables[column.name] = labelled(column.dims, values, words, unit)
     return swept.assign(variables)
 
 
