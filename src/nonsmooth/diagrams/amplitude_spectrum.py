@@ -172,31 +172,20 @@ def _dataset(
     base: float,
     count: int,
 ) -> xr.Dataset:
-    import xarray as xr
-
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance, with_short_record
-    from nonsmooth.results.schema import parameter_coords, state_coords
+    from nonsmooth.results.labels import labelled, labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.schema import dataset
 
     labels = labels_of(system)
     per = "per iterate" if labels.is_map else "Hz" if labels.time_unit == "s" else "1"
-    return with_short_record(
-        xr.Dataset(
-            {
-                "amplitude": (("frequency", "state"), amplitude, {"long_name": "amplitude"}),
-                "base_frequency": (
-                    (),
-                    base,
-                    {"long_name": "frequency of the forcing, or of the returns", "units": per},
-                ),
-                "period_number": ((), np.int64(count), {"long_name": "period number (0: none found)"}),
-            },
-            {
-                "frequency": ("frequency", frequency, {"long_name": "frequency", "units": per}),
-                "order": ("frequency", frequency / base, {"long_name": "frequency over the base frequency"}),
-                **state_coords(labels),
-                **parameter_coords(labels),
-            },
-            provenance(labels, "amplitude_spectrum", options, method=method),
-        )
+    return dataset(
+        labels,
+        provenance(labels, "amplitude_spectrum", options, method=method),
+        {
+            "amplitude": labelled(("frequency", "state"), amplitude, "amplitude"),
+            "base_frequency": labelled((), base, "frequency of the forcing, or of the returns", per),
+            "period_number": labelled((), np.int64(count), "period number (0: none found)"),
+        },
+        frequency=labelled("frequency", frequency, "frequency", per),
+        order=labelled("frequency", frequency / base, "frequency over the base frequency"),
     )
