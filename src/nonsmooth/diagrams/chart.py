@@ -153,7 +153,7 @@ class PlannedChart:
 def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> PlannedChart:
     """The work of a :func:`chart`, checked and laid out, without computing anything."""
     asked, values = as_called(locals()), _grid(system, grid)
-    _check_edges(system, values)
+    edges = _edges(system, values)
     along = _carry(values, options["carry"])
     starts = start_states(system, options["start"])
     lyapunov = options["lyapunov"]
@@ -171,7 +171,7 @@ def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> Plann
         extremes=extremes,
     )
     if settler.plan.indicator >= 0:
-        refuse_resting(system, starts, _corners(system, values), "chart")
+        refuse_resting(system, starts, edges, "chart")
     measured = checked_loads(system, options["loads"], "chart")
     axes, order = _axes(values, along)
     work = ChartWork(
@@ -195,19 +195,12 @@ def _grid(system: System, grid: Any) -> dict[str, FloatArray]:
     return {str(name): swept_values(system, name, values) for name, values in grid.items()}
 
 
-def _check_edges(system: System, values: Mapping[str, FloatArray]) -> None:
-    """Values that the system cannot have are told before anything is computed, not at the last of many points."""
+def _edges(system: System, values: Mapping[str, FloatArray]) -> FloatArray:
+    """The parameter points at the edges of the plane: what the system cannot have is told before any is computed."""
     (a, first), (b, second) = values.items()
-    for along, across in ((first[[0, -1]], second), (first, second[[0, -1]])):  # the plane's edges
-        x, y = np.meshgrid(along, across)
-        system.parameter_points({a: x.ravel(), b: y.ravel()})
-
-
-def _corners(system: System, values: Mapping[str, FloatArray]) -> FloatArray:
-    """The parameter points at the plane's corners (4, n_parameters)."""
-    (a, first), (b, second) = values.items()
-    x, y = np.meshgrid(first[[0, -1]], second[[0, -1]])
-    return system.parameter_points({a: x.ravel(), b: y.ravel()})
+    places = [np.meshgrid(first[[0, -1]], second), np.meshgrid(first, second[[0, -1]])]
+    x, y = (np.concatenate([one.ravel() for one in of]) for of in zip(*places, strict=True))
+    return system.parameter_points({a: x, b: y})
 
 
 def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | None:

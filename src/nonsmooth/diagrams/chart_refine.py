@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -191,18 +192,11 @@ class _Refinement:
         wanted[np.ix_(middle_rows, middle_columns)] = split
         # the middle of an edge only where its ends differ, or where the cell is still large
         ends = self.label[tuple(self._nearest())][np.ix_(rows, columns)] if size <= LARGEST_TRUSTED else None
-        beside = np.zeros((len(rows), len(columns) - 1), dtype=bool)
-        beside[:-1] |= split
-        beside[1:] |= split
-        if ends is not None:
-            beside &= ends[:, 1:] != ends[:, :-1]
-        wanted[np.ix_(rows, middle_columns)] |= beside
-        beside = np.zeros((len(rows) - 1, len(columns)), dtype=bool)
-        beside[:, :-1] |= split
-        beside[:, 1:] |= split
-        if ends is not None:
-            beside &= ends[1:] != ends[:-1]
-        wanted[np.ix_(middle_rows, columns)] |= beside
+        for axis, edges in ((0, np.ix_(rows, middle_columns)), (1, np.ix_(middle_rows, columns))):
+            beside = _beside(split, axis)
+            if ends is not None:
+                beside &= np.diff(ends, axis=1 - axis) != 0
+            wanted[edges] |= beside
         return wanted
 
     def _nearest(self) -> NDArray[Any]:
@@ -220,10 +214,7 @@ class _Refinement:
         filled = self.label[tuple(nearest)]
         edge = np.zeros(self.shape, dtype=bool)
         for axis in (0, 1):
-            change = np.diff(filled, axis=axis) != 0
-            first = np.take(edge, range(change.shape[axis]), axis=axis) | change
-            edge[tuple(slice(0, -1) if k == axis else slice(None) for k in (0, 1))] = first
-            edge[tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))] |= change
+            edge |= _beside(np.diff(filled, axis=axis) != 0, axis)
         distance = distance_transform_edt(~edge) + 1.0 if edge.any() else np.full(self.shape, np.inf)
         return nearest, (np.searchsorted(DISTANCES, distance).astype(np.int64), (filled < 16).astype(np.int64))
 
@@ -231,20 +222,18 @@ class _Refinement:
         """Compute a random sample of the inferred points; count the errors per class. Returns how many were wrong."""
         nearest, (near, without) = self._inferred()
         inferred = self.label == UNKNOWN
-        groups = [(a, b) for a in range(len(DISTANCES)) for b in range(2)]
-        groups = [place for place in groups if ((near == place[0]) & (without == place[1]) & inferred).any()]
+        classes = product(range(len(DISTANCES)), range(2))
+        groups = {place: np.flatnonzero((near == place[0]) & (without == place[1]) & inferred) for place in classes}
+        groups = {place: among for place, among in groups.items() if len(among)}
         guess = self.label[tuple(nearest)]
         wrong = 0
         each = max(int(FOR_PROBES * self.budget / max(len(groups), 1)), 1)
         rates.clear()  # what earlier probes found wrong has been refined since
-        for place in groups:
-            among = np.flatnonzero((near == place[0]) & (without == place[1]) & inferred)
+        for place, among in groups.items():
             chosen = self.rng.choice(among, min(each, len(among), max(self.budget - self.spent, 0)), replace=False)
             if not len(chosen):
                 continue
-            mask = np.zeros(self.label.size, dtype=bool)
-            mask[chosen] = True
-            self._compute(mask.reshape(self.shape))
+            self._compute(np.unravel_index(chosen, self.shape))
             errors = int((self.label.ravel()[chosen] != guess.ravel()[chosen]).sum())
             rates[place] = (errors, len(chosen))
             wrong += errors
@@ -254,6 +243,11 @@ class _Refinement:
 def _lines(n: int, step: int) -> IntArray:
     """Places of the grid lines of one size, the last point always among them."""
     return np.unique(np.append(np.arange(0, n, step), n - 1))
+
+
+def _beside(change: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
+    """Return what holds between two neighbours along an axis at both of them."""
+    return np.insert(change, 0, False, axis=axis) | np.insert(change, change.shape[axis], False, axis=axis)
 
 
 def _over_cells(table: IntArray, rows: IntArray, columns: IntArray, least: Any) -> IntArray:
