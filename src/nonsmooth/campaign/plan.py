@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
@@ -92,20 +93,23 @@ def plan(work: ChunkedWork, *, seconds: float = SECONDS, seed: int = 0, kept: in
         per_place.append(took / (last - first))
         spent += took
     places = places_of(work)
-    rest = 1.0 - len(per_place) / n
-    error = places * float(np.std(per_place)) / max(len(per_place) - 1, 1) ** 0.5 * rest**0.5
     first, last = work.bounds(0)
     together = [samples[chunk] for chunk in sorted(samples)]
     return Plan(
         places,
         n,
         len(per_place),
-        places * float(np.mean(per_place)),
-        error,
+        *scaled_up(per_place, places, 1.0 - len(per_place) / n),
         places * width_of(work),
         stored_bytes(work, together, kept or last - first) if find_spec("zarr") else None,
         _resident(),
     )
+
+
+def scaled_up(per_place: Sequence[float], places: int, rest: float) -> tuple[float, float]:
+    """Seconds of all places, and their standard error, from samples; ``rest`` is the part that was not sampled."""
+    error = float(np.std(per_place)) / max(len(per_place) - 1, 1) ** 0.5 * rest**0.5
+    return places * float(np.mean(per_place)), places * error
 
 
 def _spread(n: int, seed: int) -> Any:

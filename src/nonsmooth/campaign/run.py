@@ -61,13 +61,15 @@ def run(
     check_room(work, label)
     keeper = None
     if store is not None:
-        from nonsmooth.campaign.store import open_store
+        from nonsmooth.campaign.store import open_store, started
 
         keeper = open_store(store, work, any_cpu=any_cpu)
     there = set() if keeper is None else keeper.done()
     missing = [chunk for chunk in range(work.n_chunks()) if chunk not in there]
     if keeper is not None and client is not None:
-        begun = keeper.begun()  # by workers that may be at them still, for a client that is gone: they come last
+        begun = set(
+            started(keeper.path)
+        )  # by workers that may be at them still, for a client that is gone: they come last
         missing.sort(key=begun.__contains__)
     columns = {} if columns is None else columns
     if keeper is None:
@@ -227,14 +229,14 @@ def on_cluster(
     ConnectionError
         The scheduler is gone; what has come back, or is in the store, stands.
     """
-    if client is not None and not hasattr(client, "scheduler"):
-        raise TypeError(f"client = {shortened(client)}: give dask.distributed.Client(address)")
     try:
         from distributed import as_completed
         from distributed.client import FutureCancelledError
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise ImportError(MISSING) from error
+    if not hasattr(client, "scheduler"):
+        raise TypeError(f"client = {shortened(client)}: give dask.distributed.Client(address)")
     path, key = (None, "") if store is None else (str(store.path.resolve()), store.key)
     family = uuid.uuid4().hex[:16]  # never the names of a client that is gone: its tasks may be half forgotten
     order = iter(chunks)

@@ -56,23 +56,14 @@ class ChunkStore:
 
     def has(self, chunk: int) -> bool:
         """Return whether a chunk is there, whole."""
-        mark = mark_in(self.path / "run" / f"{chunk:06d}.json")
+        mark = mark_in(self._mark(chunk))
         return mark is not None and mark["key"] == self._key(chunk)
-
-    def begun(self) -> set[int]:
-        """Chunks that somebody has begun, whether they are there by now or not."""
-        log = self.path / "run" / "started.log"
-        return set(started(log)) if log.exists() else set()
-
-    def note_start(self, chunk: int) -> None:
-        """Write into the log that the work on a chunk begins: what was begun more often than once was lost before."""
-        line = json.dumps({"chunk": chunk, "host": socket.gethostname(), "process": os.getpid(), "began": time.time()})
-        with told(self.path, KEPT), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
-            log.write(line + "\n")
 
     def compute(self, work: ChunkedWork, chunk: int) -> None:
         """Compute a chunk and keep it, in the thread that calls."""
-        self.note_start(chunk)
+        line = json.dumps({"chunk": chunk, "host": socket.gethostname(), "process": os.getpid(), "began": time.time()})
+        with told(self.path, KEPT), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
+            log.write(line + "\n")  # what was begun more often than once was lost before
         now = clock(work.device)
         began = now()
         arrays = work.compute(chunk)
@@ -101,7 +92,7 @@ class ChunkStore:
                 "seconds": round(seconds, 4),
                 "ended": time.time(),
             }
-            write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(seal(mark)).encode())
+            write_whole(self._mark(chunk), json.dumps(seal(mark)).encode())
 
     def read(self, work: ChunkedWork) -> dict[str, NDArray[Any]]:
         """All columns, over all places.
@@ -120,7 +111,7 @@ class ChunkStore:
             damaged = [mark["chunk"] for mark in marks_of(self.path) if not self._is_whole(work, mark, there)]
         if damaged:
             for chunk in damaged:
-                (self.path / "run" / f"{chunk:06d}.json").unlink(missing_ok=True)
+                self._mark(chunk).unlink(missing_ok=True)
             some = ", ".join(map(str, damaged[:5]))
             raise DataFileError(
                 f"{self.path}: {len(damaged)} chunks are damaged ({some}); run it again, they will be computed anew"
@@ -137,6 +128,9 @@ class ChunkStore:
         except Exception:
             return False
         return bool(found == mark.get("content"))
+
+    def _mark(self, chunk: int) -> Path:
+        return self.path / "run" / f"{chunk:06d}.json"
 
     def _key(self, chunk: int) -> str:
         return hashlib.sha256(f"{self.key}:{chunk}".encode()).hexdigest()
@@ -211,8 +205,7 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     record["done"] = len(contents)
     record["content"] = digest(sorted(contents.items())) if len(contents) == record["chunks"] else None
     record["seconds"] = sum(mark["seconds"] for mark in marks)
-    log = target / "run" / "started.log"
-    record["started"] = len(started(log)) if log.exists() else record["done"]
+    record["started"] = len(started(target)) or record["done"]
     return record
 
 
@@ -330,10 +323,11 @@ def marks_of(path: Path) -> Iterator[dict[str, Any]]:
             yield mark
 
 
-def started(log: Path) -> list[int]:
+def started(path: Path) -> list[int]:
     """The chunks that were begun, in their order; a line that was cut short or altered is passed over."""
-    found = []
-    for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
+    found, log = list[int](), path / "run" / "started.log"
+    text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+    for line in text.splitlines():
         with suppress(ValueError, KeyError, TypeError):
             found.append(int(json.loads(line)["chunk"]))
     return found

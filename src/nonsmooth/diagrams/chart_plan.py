@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nonsmooth.campaign.plan import GOLDEN, duration
+from nonsmooth.campaign.plan import GOLDEN, duration, scaled_up
 from nonsmooth.diagrams.chart_work import ChartWork
 from nonsmooth.flow.engines.devices import batch_size, gpu_name
 from nonsmooth.flow.engines.engine import IntArray
@@ -66,9 +66,7 @@ def plan_on_gpu(work: ChartWork, *, seconds: float = 5.0, seed: int = 0) -> GpuP
         took = _took(work, places)
         per_place.append(took / len(places))
         spent, sampled = spent + took, sampled + len(places)
-    rest = max(1.0 - sampled / n, 0.0)
-    error = n * float(np.std(per_place)) / max(len(per_place) - 1, 1) ** 0.5 * rest**0.5
-    return GpuPlan(gpu_name(), n, min(sampled, n), n * float(np.mean(per_place)), error)
+    return GpuPlan(gpu_name(), n, min(sampled, n), *scaled_up(per_place, n, max(1.0 - sampled / n, 0.0)))
 
 
 def _carried(work: ChartWork, n: int) -> GpuPlan:
