@@ -67,9 +67,8 @@ def run(
     there = set() if keeper is None else keeper.done()
     missing = [chunk for chunk in range(work.n_chunks()) if chunk not in there]
     if keeper is not None and client is not None:
-        begun = set(
-            started(keeper.path)
-        )  # by workers that may be at them still, for a client that is gone: they come last
+        # by workers that may be at them still, for a client that is gone: they come last
+        begun = set(started(keeper.path))
         missing.sort(key=begun.__contains__)
     columns = {} if columns is None else columns
     if keeper is None:
