@@ -368,11 +368,22 @@ def motion() -> xr.Dataset:
 def test_pictures_of_a_motion() -> None:
     result = motion()
     for draw in (comparison_time, comparison_phase_portrait, comparison_section, comparison_distances):
-        assert "synthetic" in words(draw(result))
+        ax = draw(result)
+        assert "synthetic" in words(ax)
+        check_legend(ax)
     with pytest.raises(ValueError, match="needs a comparison of a response; this is a comparison of a motion"):
         comparison_response(result)
     with pytest.raises(ValueError, match="no result of compare"):
         comparison_diagram(xr.Dataset())
+
+
+def check_legend(ax: Any) -> None:
+    """However long its words, it stays in the figure and leaves the axes three quarters of its breadth."""
+    ax.figure.draw_without_rendering()
+    if (legend := ax.get_legend()) is not None:
+        box, whole = legend.get_window_extent(), ax.figure.bbox
+        assert whole.x0 <= box.x0 and box.x1 <= whole.x1
+        assert ax.get_window_extent().width > 0.75 * whole.width
 
 
 def entries(ax: Any) -> list[str]:
@@ -471,6 +482,7 @@ def test_a_delayed_flip_shows_as_read_and_as_corrected() -> None:
     assert (arrow.xyann[0], arrow.xy[0]) == (0.46, 0.40)
     assert {"theory", "virtual rig (synthetic)", "flip, virtual rig (synthetic), delay taken out"} <= set(entries(ax))
     assert max(np.abs(ax.get_ylim())) < 0.1  # that of the sections: marks at the top stretch no axis
+    check_legend(ax)
 
 
 def test_jumps_and_their_differences_stand_in_the_legend() -> None:
@@ -504,3 +516,4 @@ def test_jumps_and_their_differences_stand_in_the_legend() -> None:
         "numbers: theory less measured (rad/s)",
     } <= set(entries(ax))
     assert ax.get_ylabel().endswith("(mm)")
+    check_legend(ax)

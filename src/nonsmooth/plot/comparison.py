@@ -9,7 +9,7 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_plane, one_of, only_states, with_unit
-from nonsmooth.plot.style import ABOVE
+from nonsmooth.plot.sweeps import LOOKS, MARKERS, WORDS
 from nonsmooth.plot.trajectories import edge_of, shade_zone
 from nonsmooth.results.provenance import read_provenance
 from nonsmooth.system.kinds import Count, Positive, at_least
@@ -80,8 +80,7 @@ def comparison_time(ax: Axes, result: xr.Dataset, *, y: Name | None = None, peri
             some, word = shown[:: max(1, len(shown) // 120)], measured_label(result)
             ax.plot(phase[some], values[some], "o", label=word, color=MEASURED, markersize=1.6, markeredgewidth=0)
     ax.margins(x=0)
-    style.make_room(ax, 0.22)
-    ax.legend(loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.4)
+    style.legend(ax, columns=3)
     ax.set_xlabel("time (forcing periods)")
     name_axes(ax, y=name_and_unit(result, name))
 
@@ -127,8 +126,7 @@ def comparison_phase_portrait(
         ax.plot(*points, "o", label=f"section points, {word}", **looks)
     if zone is not None:
         shade_zone(ax, edge_of(result, zone))
-    style.make_room(ax, 0.15)
-    ax.legend(loc="upper center", ncols=2)
+    style.legend(ax)
     name_plane(ax, result, *names)
 
 
@@ -221,7 +219,7 @@ def comparison_diagram(ax: Axes, result: xr.Dataset, *, y: Name | None = None, s
     style.cloud(ax, read, size, MEASURED, measured_label(result))
     _flips(ax, result)
     ax.margins(x=0)
-    style.even_dots(ax.legend(**ABOVE, ncols=2, columnspacing=1.0))
+    style.legend(ax)
     name_plane(ax, result, parameter, name)
 
 
@@ -251,9 +249,6 @@ def _flips(ax: Axes, result: xr.Dataset) -> None:
             style.points(ax, [still], [0.965], xerr=[error], label=label, **looks)
 
 
-_LOOKS = {"up": ("first", "^", "-", "increasing"), "down": ("second", "v", "--", "decreasing")}
-
-
 @figure()
 def comparison_response(ax: Axes, result: xr.Dataset, *, digits: Annotated[int, at_least(0, 15)] = 3) -> None:
     """Draw a comparison of a response.
@@ -272,17 +267,18 @@ def comparison_response(ax: Axes, result: xr.Dataset, *, digits: Annotated[int, 
     (state,) = only_states(result, None)
     values, runs, word = result[parameter].values, result["measured_direction"].values, measured_label(result)
     for i, direction in enumerate(result["direction"].values.astype(str)):
-        shade, marker, line, name = _LOOKS[direction]
-        color = style.COLORS[shade]
+        looks, name = LOOKS[direction], WORDS[direction]
+        color = looks["color"]
         shade_reach(ax, result.isel(direction=i), values, color=color, alpha=0.2)
-        ax.plot(values, result["theory_amplitude"].values[:, i], line, color=color, label=f"theory, {name}")
+        ax.plot(values, result["theory_amplitude"].values[:, i], label=f"theory, {name}", **looks)
         keys = (f"measured_{parameter}", "measured_amplitude", "measured_amplitude_error")
         at, heights, error = (result[key].values[runs == direction] for key in keys)
-        style.points(ax, at, heights, yerr=error, color=color, face="white", mark=marker, label=f"{word}, {name}")
+        looks = {"color": color, "face": "white", "mark": MARKERS[direction], "label": f"{word}, {name}"}
+        style.points(ax, at, heights, yerr=error, **looks)
     written = _jumps(ax, result, digits)
     ax.set_ylim(bottom=0)
     ax.margins(x=0.02)
-    ax.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
+    style.legend(ax)
     name_plane(ax, result, parameter, state, "amplitude of ")
     style.apart(ax, written)
 
@@ -297,7 +293,7 @@ def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> list[Any]:
     written: list[Any] = []
     for row in range(result.sizes.get("jump", 0)):
         direction = str(result["jump_direction"].values[row])
-        color = style.COLORS[_LOOKS[direction][0]]
+        color = LOOKS[direction]["color"]
         seen, expected = (float(result[name].values[row]) for name in ("measured_jump", "theory_jump"))
         for place, face in ((seen, color), (expected, "white")):
             if np.isfinite(place):

@@ -45,7 +45,7 @@ COLORS = {
 #: Properties of what is drawn, as Matplotlib takes them.
 Properties = dict[str, Any]
 #: A legend above the axes, for pictures that fill theirs.
-ABOVE: Properties = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+_ABOVE: Properties = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2, "handlelength": 1.6}
 
 
 def beside(height: float) -> Properties:
@@ -263,12 +263,6 @@ def shade(ax: Axes, x: Any, where: Any, **looks: Any) -> None:
     ax.fill_between(x, 0, 1, where=where, transform=ax.get_xaxis_transform(), **looks)
 
 
-def make_room(ax: Axes, share: float) -> None:
-    """Raise the upper end of the ordinate by a share of its length: room for a legend."""
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + share * (high - low))
-
-
 def shared_legend(figure: Figure, columns: int = 5) -> Legend:
     """Put one legend under all axes of a figure in place of their own, so that it hides nothing.
 
@@ -299,27 +293,36 @@ def scattered(line: Any) -> bool:
 
 def even_dots(legend: Legend) -> None:
     """Show the dots of point clouds in a legend large enough to be told apart, whatever their size in the figure."""
-    from matplotlib.lines import Line2D
+    shown: list[Any] = [one for one in legend.legend_handles if scattered(one)]
+    for one in shown:
+        if one.get_marker() == ".":
+            one.set_markersize(_DOT)
 
-    for shown in legend.legend_handles:
-        if isinstance(shown, Line2D) and shown.get_marker() == ".":
-            shown.set_markersize(_DOT)
+
+def legend(ax: Axes, loc: str = "", columns: int = 2) -> Legend:
+    """Place the legend in the axes, or above them, in as many columns as the figure has room for."""
+    whole: Any = ax.figure.canvas.figure  # of a figure within a figure too
+    place = {"loc": loc} if loc else _ABOVE
+    for number in range(columns, 0, -1):  # names of modes may be long
+        made = ax.legend(**place, ncols=number, columnspacing=1.0)
+        if made.get_window_extent().width <= 0.9 * whole.bbox.width:
+            break
+    even_dots(made)
+    return made
 
 
 def clear_legend(ax: Axes) -> Legend:
-    """Place the legend in the axes where it covers nothing, else above them, in one column where two would leave the
-    figure; call it when all is drawn."""
-    legend = ax.legend(loc="best")
-    whole: Any = ax.figure.canvas.figure  # of a figure within a figure too
+    """Place the legend in the axes where it covers nothing, else above them; call it when all is drawn."""
+    inside = legend(ax, "best", columns=1)
+    whole: Any = ax.figure.canvas.figure
     whole.draw_without_rendering()
-    box = legend.get_window_extent()
+    box = inside.get_window_extent()
     for line in ax.lines:
         path = line.get_path().transformed(line.get_transform())
         crossed = not scattered(line) and path.cleaned(remove_nans=True).intersects_bbox(box, filled=False)
         if crossed or box.count_contains(path.vertices):
-            above = ax.legend(**ABOVE, ncols=2, columnspacing=1.0)
-            return ax.legend(**ABOVE) if above.get_window_extent().width > whole.bbox.width else above
-    return legend
+            return legend(ax)
+    return inside
 
 
 def apart(ax: Axes, labels: Iterable[Any]) -> None:

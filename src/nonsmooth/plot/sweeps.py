@@ -84,7 +84,7 @@ def bifurcation(
     directions = dict(by_direction(result, points))
     for direction, mine in directions.items():
         under = direction == "up" and "down" in directions
-        shade = color or (style.COLORS["pale"] if under else _LOOKS[direction]["color"])
+        shade = color or (style.COLORS["pale"] if under else LOOKS[direction]["color"])
         words = direction if len(directions) > 1 else None
         cloud = result[parameter].values, mine.transpose(..., parameter).values
         style.cloud(ax, cloud, size * (_SEAM if under else 1.0), shade, words)
@@ -93,7 +93,7 @@ def bifurcation(
     _whole(ax, result[parameter].values)
     _name(ax, result, parameter, name, points)
     if len(directions) > 1 or over:
-        style.even_dots(style.clear_legend(ax))
+        style.clear_legend(ax)
 
 
 def _whole(ax: Axes, values: Any) -> None:
@@ -137,7 +137,7 @@ def bifurcation_diagram(
         draw_branch(ax, one_branch(result, k), y=name, special=special)
     _whole(ax, result["swept_value"].values)
     name_plane(ax, result, parameter, name)
-    style.even_dots(style.clear_legend(ax))
+    style.clear_legend(ax)
 
 
 def one_branch(result: xr.Dataset, k: int) -> xr.Dataset:
@@ -171,12 +171,14 @@ def one_branch(result: xr.Dataset, k: int) -> xr.Dataset:
     return one.assign(special_point=one["special_point"] - points[0])
 
 
-_LOOKS: dict[str, style.Properties] = {
+#: Lines, words and markers of a sweep's directions, in every picture.
+LOOKS: dict[str, style.Properties] = {
     "up": {"color": style.COLORS["first"], "linestyle": "-"},
     "down": {"color": style.COLORS["second"], "linestyle": "--"},
     "none": {"color": style.COLORS["section"], "linestyle": "none", "marker": ".", "markersize": 1.5},
 }
-_WORDS = {"up": "increasing", "down": "decreasing", "none": "each from its start"}
+WORDS = {"up": "increasing", "down": "decreasing", "none": "each from its start"}
+MARKERS = {"up": "^", "down": "v"}
 
 
 @figure("frequency_response", "amplitude")
@@ -231,7 +233,7 @@ def frequency_response(
             found = _intervals(values, curve, _jumps(result, jumping, direction, k))
             at = [i for _, i in found]
             broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
-            style.line(ax, *broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
+            style.line(ax, *broken, label=WORDS[direction] if k == 0 else None, **LOOKS[direction])
             for place, i in found if jumps else ():
                 marks.append(_mark(ax, values, curve, i, place, direction, digits))
     for behind in over:
@@ -292,7 +294,7 @@ def _mark(
     before, after = (
         (curve[at - 1], curve[at]) if (direction == "up") == (values[0] <= values[-1]) else (curve[at], curve[at - 1])
     )
-    color = _LOOKS[direction]["color"]
+    color = LOOKS[direction]["color"]
     arrow = {"arrowstyle": "->", "color": color, "linestyle": ":", "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", (place, after), (place, before), arrowprops=arrow)
     share = (place - values.min()) / np.ptp(values)

@@ -10,10 +10,10 @@ import numpy as np
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, picture
+from nonsmooth.plot.sweeps import MARKERS
 
 _TIME = ("time", "s")
 _OMEGA, _AMPLITUDE = (r"$\omega$", "rad/s"), ("amplitude of $x$", "m")
-_MARKERS = {"up": "^", "down": "v"}
 _FITS = (("joint", "$c$ beside dry friction", "first", "-", "s"), ("viscous", "$c$ alone", "second", "--", "D"))
 _ENVELOPES = (("both", "viscous and dry", "first", "-"), ("viscous", "viscous alone", "second", "--"))
 _CRANKS = ("o", "s", "^", "D")
@@ -36,7 +36,7 @@ def amplitude_fit(one: Picture, finding: Any) -> None:
     omega, heights, fine = one.values("omega", "amplitude", "omega_fine")
     words = one.data["direction"].values.astype(str) if "direction" in one.data else np.full(len(omega), "")
     for word in dict.fromkeys(words):
-        label, mark = f"{one.word}, steps {word}" if word else "", _MARKERS.get(word, "o")
+        label, mark = f"{one.word}, steps {word}" if word else "", MARKERS.get(word, "o")
         one.points("omega", "amplitude", label, where=words == word, mark=mark, face="white")
     error = one.data["amplitude_error"].values if "amplitude_error" in one.data else None
     for name, word, color, line, mark in _FITS:

@@ -76,8 +76,20 @@ def picture(
         def drawn(ax: Axes, *given: Any, **named: Any) -> None:
             one = Picture(ax, data_of(given[0], *needed.split()) if needed else None, x, y)
             draw(one, *given, **named)
-            if one.data is not None:
-                one.finish(margin, strip, {"loc": loc} if loc else {**style.ABOVE, "handlelength": 1.6}, columns)
+            if one.data is None:  # what was drawn has its own axes and words
+                return
+            ax.margins(x=margin)
+            names = (
+                name
+                if isinstance(name, tuple)
+                else (one.data[name].attrs.get("long_name", name), one.data[name].attrs.get("units", ""))
+                for name in (one.x, one.y)
+            )
+            across, up = names
+            name_axes(ax, across, up)
+            if one.left:
+                one.draw_residuals(up[1] if strip is None else strip)
+            style.legend(ax, loc, columns)
 
         own, *others = inspect.signature(draw).parameters.values()
         drawn.__signature__ = inspect.Signature([own.replace(name="ax", annotation="Axes"), *others])  # type: ignore[attr-defined]
@@ -97,24 +109,6 @@ class Picture:
     def word(self) -> str:
         """Word for the measured side."""
         return measured_label(self.data)
-
-    def finish(self, margin: float, strip: str | None, place: style.Properties, columns: int) -> None:
-        """Name the axes, draw the residuals and set the legend."""
-        self.ax.margins(x=margin)
-        x, y = (
-            name
-            if isinstance(name, tuple)
-            else (self.data[name].attrs.get("long_name", name), self.data[name].attrs.get("units", ""))
-            for name in (self.x, self.y)
-        )
-        name_axes(self.ax, x, y)
-        if self.left:
-            self.draw_residuals(y[1] if strip is None else strip)
-        for number in range(columns, 0, -1):  # names of modes may be long
-            legend = self.ax.legend(**place, ncols=number, columnspacing=1.0)
-            if legend.get_window_extent().width <= 0.9 * self.ax.figure.bbox.width:
-                break
-        style.even_dots(legend)
 
     def values(self, *names: str) -> list[Any]:
         """The values of variables."""
