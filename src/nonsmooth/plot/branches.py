@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,20 +18,48 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-#: Marker and words of each kind of special point.
-MARKS = {
-    "fold": ("o", "fold"),
-    "flip": ("s", "flip"),
-    "neimark_sacker": ("D", "Neimark-Sacker"),
-    "pitchfork": ("^", "pitchfork"),
-    "transcritical": ("<", "transcritical"),
-    "branch_point": ("v", "branch point"),
-    "grazing": ("X", "grazing"),
-    "corner": ("P", "corner"),
-    "hopf": ("H", "Hopf"),
-    "boundary_equilibrium": ("p", "boundary equilibrium"),
+#: Marker of each kind of special point, along a branch or a curve; of others a star.
+MARKERS = {
+    "fold": "o",
+    "flip": "s",
+    "neimark_sacker": "D",
+    "pitchfork": "^",
+    "transcritical": "<",
+    "branch_point": "v",
+    "grazing": "X",
+    "corner": "P",
+    "hopf": "H",
+    "boundary_equilibrium": "p",
+    "cusp": "v",
+    "fold_flip": "s",
+    "resonance_1_1": "D",
+    "resonance_1_2": "h",
+    "resonance_1_3": "^",
+    "resonance_1_4": "d",
+    "grazing_fold": "o",
+    "grazing_flip": "p",
+    "grazing_neimark_sacker": "8",
+    "double_grazing": "X",
+    "chenciner": "<",
+    "fold_neimark_sacker": ">",
+    "flip_neimark_sacker": "H",
 }
-_OTHER = "*"
+#: Words of kinds that are not those of the name itself.
+_KIND_WORDS = {
+    "neimark_sacker": "Neimark-Sacker",
+    "hopf": "Hopf",
+    "fold_flip": "fold-flip",
+    "resonance_1_1": "1:1 resonance",
+    "resonance_1_2": "1:2 resonance",
+    "resonance_1_3": "1:3 resonance",
+    "resonance_1_4": "1:4 resonance",
+    "grazing_fold": "grazing-fold",
+    "grazing_flip": "grazing-flip",
+    "grazing_neimark_sacker": "grazing-Neimark-Sacker",
+    "chenciner": "Chenciner",
+    "fold_neimark_sacker": "fold-Neimark-Sacker",
+    "flip_neimark_sacker": "flip-Neimark-Sacker",
+}
 #: Diameters in points. Several kinds meet at one point where a branch grazes: the smaller one lies on the larger.
 _SIZES = {"fold": 6.5, "flip": 5.5}
 _SIZE = 4.0
@@ -106,7 +133,7 @@ def draw_branch(
             label = style.once(ax, f"{_STATES[line]} branch")
             style.line(ax, with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
     if special and result.sizes.get("special", 0):
-        _mark_special(ax, result, values, ordinates, MARKS)
+        _mark_special(ax, result, values, ordinates)
     return name
 
 
@@ -131,17 +158,19 @@ def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> FloatArray:
     return np.asarray(chosen.transpose(*others, "point").values, dtype=float).reshape(-1, result.sizes["point"])
 
 
-def _mark_special(
-    ax: Axes, result: xr.Dataset, x: Any, heights: FloatArray, marks: Mapping[str, tuple[str, str]]
-) -> None:
+def words_of_kind(kind: str) -> str:
+    """A kind of special point, or of a curve of them, in words."""
+    return _KIND_WORDS.get(kind, kind.replace("_", " "))
+
+
+def _mark_special(ax: Axes, result: xr.Dataset, x: Any, heights: FloatArray) -> None:
     """The special points on each of the lines (lines, point), every kind with its own sign and words."""
     at = result["special_point"].values.astype(int)
     kinds = result["special_kind"].values.astype(str)
     for kind in dict.fromkeys(kinds.tolist()):
         here = at[kinds == kind]
-        marker, words = marks.get(kind, (_OTHER, kind.replace("_", " ")))
-        size = _SIZES.get(kind, _SIZE)
-        style.mark(ax, (x[here], heights[:, here]), marker, words, size, zorder=5.7 - 0.1 * size)
+        marker, size = MARKERS.get(kind, "*"), _SIZES.get(kind, _SIZE)
+        style.mark(ax, (x[here], heights[:, here]), marker, words_of_kind(kind), size, zorder=5.7 - 0.1 * size)
 
 
 def lines_of(result: xr.Dataset) -> list[tuple[str, IntArray]]:
@@ -174,30 +203,12 @@ def with_breaks(values: FloatArray, at: IntArray) -> FloatArray:
     return np.where(at < 0, np.nan, values[at])
 
 
-#: Colour, line and words of each kind of curve.
+#: Colour and line of each kind of curve.
 KINDS = {
-    "fold": ("first", "-", "fold"),
-    "flip": ("second", "--", "flip"),
-    "neimark_sacker": ("fourth", "-.", "Neimark-Sacker"),
-    "grazing": ("section", ":", "grazing"),
-}
-#: Marker and words of each point of codimension two.
-POINTS = {
-    "cusp": ("v", "cusp"),
-    "fold_flip": ("s", "fold-flip"),
-    "resonance_1_1": ("D", "1:1 resonance"),
-    "resonance_1_2": ("h", "1:2 resonance"),
-    "resonance_1_3": ("^", "1:3 resonance"),
-    "resonance_1_4": ("d", "1:4 resonance"),
-    "grazing_fold": ("o", "grazing-fold"),
-    "grazing_flip": ("p", "grazing-flip"),
-    "grazing_neimark_sacker": ("8", "grazing-Neimark-Sacker"),
-    "double_grazing": ("X", "double grazing"),
-    "generalised_flip": ("*", "generalised flip"),
-    "chenciner": ("<", "Chenciner"),
-    "fold_neimark_sacker": (">", "fold-Neimark-Sacker"),
-    "flip_neimark_sacker": ("H", "flip-Neimark-Sacker"),
-    "corner": ("P", "corner"),
+    "fold": ("first", "-"),
+    "flip": ("second", "--"),
+    "neimark_sacker": ("fourth", "-."),
+    "grazing": ("section", ":"),
 }
 
 
@@ -220,14 +231,15 @@ def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: Any = No
 
     # The two parameters are the only coordinates over the points, in the order in which they were given.
     x, y = (str(name) for name, values in result.coords.items() if values.dims == ("point",))
-    shade, line, words = KINDS[str(result["kind"].values)]
+    kind = str(result["kind"].values)
+    shade, line = KINDS[kind]
     over_chart = any(isinstance(item, QuadMesh) for item in ax.collections)
     looks: style.Properties = {"path_effects": style.halo(1.8)} if over_chart else {}
     looks |= {"color": color or style.COLORS[shade], "linewidth": 1.0, "zorder": 3}
     values, heights = result[x].values, result[y].values
-    style.line(ax, values, heights, line, label=style.once(ax, words), **looks)
+    style.line(ax, values, heights, line, label=style.once(ax, words_of_kind(kind)), **looks)
     if special:
-        _mark_special(ax, result, values, heights[None], POINTS)
+        _mark_special(ax, result, values, heights[None])
     name_plane(ax, result, x, y)
     own, before = ax.get_legend_handles_labels()[1], ax.get_legend()
     if before is not None and not {text.get_text() for text in before.get_texts()} <= set(own):

@@ -48,8 +48,6 @@ class Scheme:
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nonsmooth.plot.pen import Link
-
 #: ``("line", x, y, color, width, fill)``, filled where a colour is given, or ``("text", x, y, words, color, size, ha,
 #: va)``.
 Part = tuple[Any, ...]

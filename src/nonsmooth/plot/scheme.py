@@ -34,7 +34,8 @@ class _SchemeReader:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.loads = system._description.loads
+        self.loads = loads = system._description.loads
+        self.elements, self.powers = ((), {}) if loads is None else (loads.elements, loads.powers)
         t = system._description.traced
         self.t, self.u, self.p = t.t, list(t.u), list(t.p)
         first = self._smooth(t)
@@ -83,10 +84,9 @@ class _SchemeReader:
                     if not self.is_zero(row[j]):
                         self.join(kind, j, i, self.text(-row[j]))
         self._forces()
-        if self.loads is not None and self.loads.elements:
-            for load in self.loads.elements:
-                self._element(load)
-        else:
+        for load in self.elements:
+            self._element(load)
+        if not self.elements:
             self._transitions()
         if not self.scheme.links:
             raise self._off("nothing joins them")
@@ -128,7 +128,7 @@ class _SchemeReader:
         """The masses where a force, a damper or an element tells them, else the denominators of the accelerations."""
         size = len(self.q)
         found: list[Any] = [None] * size
-        powers = {} if self.loads is None else self.loads.powers
+        powers = self.powers
         if powers:
             drag, push = powers.get("damping", sp.Integer(0)), powers.get("forcing", sp.Integer(0))
             table = [[sp.diff(drag, a, b) / 2 for b in self.v] for a in self.v]
@@ -141,7 +141,7 @@ class _SchemeReader:
             pairs = [(i, j) for i in range(size) for j in range(size) if found[i] is not None]
             if 0 in found or not all(self.is_zero(table[i][j], -found[i] * damping[i][j]) for i, j in pairs):
                 raise self._off("its mass matrix is not diagonal")
-        for load in self.loads.elements if self.loads is not None else ():
+        for load in self.elements:
             if load.kind == "Rubbing":
                 raise self._off(f"the contact {load.rubs!r} rubs along another coordinate")
             along = self.v if load.element.kinematics == "speed" else self.q
@@ -168,12 +168,11 @@ class _SchemeReader:
 
     def _forces(self) -> None:
         """Forces on masses, and the motion of the base."""
-        powers = {} if self.loads is None else self.loads.powers
-        if "base" in powers:
+        if "base" in self.powers:
             self.scheme.base = r"\ddot y"
         for i, v in enumerate(self.v):
-            if "forcing" in powers:
-                force = sp.diff(powers["forcing"], v)
+            if "forcing" in self.powers:
+                force = sp.diff(self.powers["forcing"], v)
             else:
                 force = sp.expand(self.acceleration[i].subs(self.still) * (self.masses[i] or 1))
             if force != 0 and not force.has(sp.zoo, sp.nan):

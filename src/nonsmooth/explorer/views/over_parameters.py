@@ -13,7 +13,7 @@ from nonsmooth.explorer.raster import Layer, drawn
 from nonsmooth.explorer.schedule import key_of
 from nonsmooth.explorer.state import CHOICES
 from nonsmooth.explorer.views.view import Ends, Legend, Request, Requests, Results, View
-from nonsmooth.plot.branches import MARKS, lines_of, ordinates_of, with_breaks
+from nonsmooth.plot.branches import MARKERS, lines_of, ordinates_of, with_breaks, words_of_kind
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.sweeps import one_branch
 from nonsmooth.results.labels import in_words
@@ -183,10 +183,21 @@ class Diagram(View):
 #: Lines by their stability: name, dash and width.
 _LINES = {"-": ("stable", "solid", 1.8), "--": ("unstable", "dashed", 1.3), ":": ("virtual", "dotted", 1.3)}
 _STROKES = {"-": "━", "--": "╍", ":": "┈"}  # in the legend
-#: Markers of Bokeh for the kinds of special points, and the letter that shows each in the legend.
-_SHAPES = ["circle", "square", "diamond", "triangle", "triangle_pin", "inverted_triangle", "x", "cross", "hex", "star"]
-_SIGNS = dict(zip(MARKS, zip(_SHAPES, "○□◇△▲▽×+⬡☆", strict=True), strict=True))
-_OTHER = "asterisk", "∗"
+#: Bokeh's names of the pictures' markers, and the letter that shows each in the legend.
+_SHAPES = [
+    "circle",
+    "square",
+    "diamond",
+    "triangle",
+    "triangle_pin",
+    "inverted_triangle",
+    "x",
+    "cross",
+    "hex",
+    "star",
+    "asterisk",
+]
+_SIGNS = dict(zip("osD^<vXPHp*", zip(_SHAPES, "○□◇△▲▽×+⬡☆∗", strict=True), strict=True))
 _WORDS = {"neimark_sacker": "Neimark-Sacker bifurcation", "flip": "flip (period doubling)"}
 
 
@@ -258,8 +269,8 @@ class Branches(View):
                     lines[line] += [[with_breaks(values, some), with_breaks(row, some)], [[np.nan], [np.nan]]]
                 points += zip(values, row, told, strict=True)
                 for at, kind in marks:
-                    words = f"{_WORDS.get(kind, kind.replace('_', ' '))} at {places[at]}: {orbits[at]}"
-                    special.append((values[at], row[at], words, _SIGNS.get(kind, _OTHER)[0]))
+                    words = f"{_WORDS.get(kind, words_of_kind(kind))} at {places[at]}: {orbits[at]}"
+                    special.append((values[at], row[at], words, _sign(kind)[0]))
         for line, source in self._lines.items():
             source.data = dict(zip("xy", np.concatenate(lines[line], axis=1), strict=True))
         # of points at one place the first is told: the special ones
@@ -271,9 +282,7 @@ class Branches(View):
         if self.setting("show") != "yes":
             return []
         lines = [(_LINES[line][0], _STROKES[line]) for line, source in self._lines.items() if len(source.data["x"])]
-        marks = [
-            (MARKS.get(kind, ("", kind.replace("_", " ")))[1], _SIGNS.get(kind, _OTHER)[1]) for kind in self._kinds
-        ]
+        marks = [(words_of_kind(kind), _sign(kind)[1]) for kind in self._kinds]
         return [(words, INK[self.dark], sign) for words, sign in lines + marks]
 
     def clear(self) -> None:
@@ -282,6 +291,10 @@ class Branches(View):
         self._kinds = {}
         for source in (*self._lines.values(), self._points, self._marks):
             source.data = {key: [] for key in source.data}
+
+
+def _sign(kind: str) -> tuple[str, str]:
+    return _SIGNS[MARKERS.get(kind, "*")]
 
 
 def _multipliers(multipliers: Any) -> str:
