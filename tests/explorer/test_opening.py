@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from urllib.parse import parse_qsl
 
@@ -88,3 +89,14 @@ def test_what_cannot_be_opened_is_said(
         (tmp_path / name).write_text(content)
     assert main(["explore", str(tmp_path / name), "--no-browser"]) != 0
     assert said in capsys.readouterr().err
+
+
+def test_without_bokeh_the_message_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [one for one in sys.modules if one.startswith(("bokeh.", "nonsmooth.explorer."))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "bokeh", None)
+    assert main(["explore", "impact_oscillator", "--no-browser"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("nonsmooth: the explorer needs the package bokeh, which is not installed:")
