@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 
-def _free(t: Any, u: Any, p: Any) -> Any:  # Eq. 7a
-    x, v = u
-    return v, (p.rho * np.cos(p.omega * t) - 2 * p.k * x - p.c * v) / p.m
+def _motion(support: Any) -> Any:
+    """Newton's law with a force of the support."""
 
+    def field(t: Any, u: Any, p: Any) -> Any:
+        x, v = u
+        return v, (p.rho * np.cos(p.omega * t) - 2 * p.k * x - p.c * v + support(t, u, p)) / p.m
 
-def _contact(t: Any, u: Any, p: Any) -> Any:  # Eq. 7b
-    x, v = u
-    return v, (p.rho * np.cos(p.omega * t) - 2 * p.k * x - p.c * v - p.k_s * (x - p.g) - p.c_s * v) / p.m
+    return field
 
 
 def _penetration(t: Any, u: Any, p: Any) -> Any:  # h_a of Eq. 3
@@ -36,6 +36,10 @@ def _penetration(t: Any, u: Any, p: Any) -> Any:  # h_a of Eq. 3
 
 def _separation(t: Any, u: Any, p: Any) -> Any:  # h_b of Eq. 3: the support's force over k_s
     return -(u.x - p.g) - p.c_s / p.k_s * u.v
+
+
+def _no_force(t: Any, u: Any, p: Any) -> Any:
+    return 0
 
 
 def _force(t: Any, u: Any, p: Any) -> Any:  # f_s below Eq. 2
@@ -48,18 +52,8 @@ def _entering_force(t: Any, u: Any, p: Any) -> Any:
     return -p.k_s / 2 * (u.x - p.g + p.eta) - p.c_s * u.v + p.c_s * p.v_a * (1 - q)
 
 
-def _entering(t: Any, u: Any, p: Any) -> Any:  # Eq. 8a
-    x, v = u
-    return v, (p.rho * np.cos(p.omega * t) - 2 * p.k * x - p.c * v + _entering_force(t, u, p)) / p.m
-
-
 def _leaving_force(t: Any, u: Any, p: Any) -> Any:
     return -p.k_s / 2 * (u.x - p.g + p.eta) - p.c_s / 2 * u.v
-
-
-def _leaving(t: Any, u: Any, p: Any) -> Any:  # Eq. 8b
-    x, v = u
-    return v, (p.rho * np.cos(p.omega * t) - 2 * p.k * x - p.c * v + _leaving_force(t, u, p)) / p.m
 
 
 def discontinuous_support(**parameters: float) -> System:
@@ -108,18 +102,20 @@ def discontinuous_support(**parameters: float) -> System:
             "rho": (0.45, "N"),
             "omega": (3.69, "rad/s"),
         },
-        modes={"free": _free, "contact": _contact},
+        modes={"free": _motion(_no_force), "contact": _motion(_force)},  # Eq. 7
         indicators={"penetration": _penetration, "separation": _separation},
         transitions=[
             Transition("free", "contact", when="penetration > 0 and separation < 0"),
             Transition("contact", "free", when="separation > 0"),
         ],
-        outputs={"contact_force": ({"free": lambda t, u, p: 0.0, "contact": _force}, "N")},
+        outputs={"contact_force": ({"free": _no_force, "contact": _force}, "N")},
         scale={"x": 1e-3, "v": 1e-2},
-        bands={
+        bands={  # Eq. 8
             "penetration": Band(
-                _entering, write={"v_a": (lambda t, u, p: u.v, "m/s")}, outputs={"contact_force": _entering_force}
+                _motion(_entering_force),
+                write={"v_a": (lambda t, u, p: u.v, "m/s")},
+                outputs={"contact_force": _entering_force},
             ),
-            "separation": Band(_leaving, outputs={"contact_force": _leaving_force}),
+            "separation": Band(_motion(_leaving_force), outputs={"contact_force": _leaving_force}),
         },
     ).with_parameters(parameters)
