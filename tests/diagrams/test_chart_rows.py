@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.diagrams.chart import plan_chart
-from nonsmooth.diagrams.chart_rows import along_rows, side_by_side
+from nonsmooth.diagrams.chart_work import along_rows, side_by_side
 from nonsmooth.kernels.hybrid import codes
 
 SUPPORT = ns.models.discontinuous_support(g=0.02), {"omega": np.linspace(3, 7, 9), "rho": [0.12, 0.2, 0.3]}

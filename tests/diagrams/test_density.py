@@ -50,15 +50,15 @@ def test_range_from_a_coarse_run_holds_the_points_and_threads_do_not_matter() ->
 
 
 def test_edges_belong_to_bins_as_in_numpy_and_nothing_is_lost() -> None:
-    from nonsmooth.diagrams.sweep_pieces import Counter
+    from nonsmooth.kernels.histogram import count
 
     rng = np.random.default_rng(5)
     edges = np.array([np.linspace(-0.3, 0.7, 11)])
     x = np.concatenate([rng.uniform(-0.5, 1.0, 500), edges[0], np.nextafter(edges[0], -1), [np.nan]])
-    counter = Counter(1, edges)
-    counter.count(x.reshape(1, -1, 1), 0)
-    np.testing.assert_array_equal(counter.counts[0, 0], np.histogram(x[:-1], edges[0])[0])
-    assert counter.counts.sum() + counter.outside.sum() == len(x)
+    counts, outside = np.zeros((1, 10), dtype=np.int32), np.zeros(1, dtype=np.int64)
+    count(x.reshape(1, -1, 1), 0, edges, counts, outside)
+    np.testing.assert_array_equal(counts[0], np.histogram(x[:-1], edges[0])[0])
+    assert counts.sum() + outside.sum() == len(x)
 
 
 def test_points_that_fail_are_counted_nowhere() -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Unpack, cast
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import warn_if_small
-from nonsmooth.flow.loads import Quantities, checked_loads
+from nonsmooth.flow.loads import checked_loads
 from nonsmooth.flow.options import Campaign, as_called, kept_of, workers_of
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.system.arguments import checked
@@ -100,8 +100,8 @@ def chart(
     those beside them where a point in between disagrees; see :mod:`nonsmooth.diagrams.chart_refine`.
     """
     asked = as_called(locals())
-    planned = plan_chart(system, **asked)
-    work, label = planned.work, f"chart over {' and '.join(planned.values)}"
+    work, result = plan_chart(system, **asked)
+    label = f"chart over {' and '.join(grid)}"
     chunked = options["store"] is not None or options["client"] is not None
     if not isinstance(refine, bool) or refine:
         from nonsmooth.diagrams.chart_refine import refined
@@ -113,40 +113,14 @@ def chart(
         if chunked and work.device == "cpu":
             work = replace(work, chunk=STORED)
         fill = partial(run, work, **kept_of(options))
-
-    def result(flat: Mapping[str, Any], whole: bool) -> xr.Dataset:
-        arrays = planned.over_grid(flat)
-        if whole and "maximum" in arrays:
-            warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
-        return planned.dataset(asked, arrays)
-
     return whole_or_part(fill, label, result)
 
 
-@dataclass(frozen=True)
-class PlannedChart:
-    """A chart's work, and how its flat columns become arrays over the grid."""
+class PlannedChart(NamedTuple):
+    """A chart's work, and what makes a result of its columns, of all of them or of those that are there."""
 
     work: ChartWork
-    values: Mapping[str, FloatArray]
-    order: Callable[[Any], Any]
-    loads: Quantities
-
-    def over_grid(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """The arrays of flat columns."""
-        return {name: self.order(column) for name, column in flat.items()}
-
-    def dataset(self, asked: Mapping[str, Any], arrays: dict[str, Any]) -> xr.Dataset:
-        """The chart as a result."""
-        from nonsmooth.results.global_schema import chart as build
-        from nonsmooth.results.labels import labels_of
-        from nonsmooth.results.provenance import provenance
-
-        work = self.work
-        labels = labels_of(work.settler.system)
-        record = provenance(labels, "chart", {**asked, "grid": self.values}, method=work.settler.engine.name)
-        one_start = is_one_start(asked["start"]) or len(work.starts) == 1
-        return build(labels, record, self.values, arrays, starts=work.starts, one_start=one_start, loads=self.loads)
+    result: Callable[[Mapping[str, Any], bool], xr.Dataset]
 
 
 @checked(of=chart)
@@ -184,7 +158,21 @@ def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> Plann
         chunk=CHUNK if settler.device == "cpu" else BATCH,
         described=inputs(system, "chart", asked | {"grid": values}),
     )
-    return PlannedChart(work, values, order, measured)
+
+    def result(flat: Mapping[str, Any], whole: bool) -> xr.Dataset:
+        from nonsmooth.results.global_schema import chart as build
+        from nonsmooth.results.labels import labels_of
+        from nonsmooth.results.provenance import provenance
+
+        arrays = {name: order(column) for name, column in flat.items()}
+        if whole and "maximum" in arrays:
+            warn_if_small(system, starts, arrays["maximum"], arrays["minimum"])
+        labels = labels_of(settler.system)
+        record = provenance(labels, "chart", asked | {"grid": values}, method=settler.engine.name)
+        one_start = is_one_start(options["start"]) or len(starts) == 1
+        return build(labels, record, values, arrays, starts=starts, one_start=one_start, loads=measured)
+
+    return PlannedChart(work, result)
 
 
 def _grid(system: System, grid: Any) -> dict[str, FloatArray]:

@@ -279,8 +279,8 @@ class _Sweep:
         if self.edges is None:
             arrays["section"] = whole(gather("kept.section"))
         else:
-            arrays["density"] = gather("counter.counts")
-            arrays["outside"] = gather("counter.outside")
+            arrays["density"] = gather("counts")
+            arrays["outside"] = gather("outside")
         if asked["judge"]:
             arrays["period_number"] = gather("period_number")
             arrays["residual"] = gather("residual")

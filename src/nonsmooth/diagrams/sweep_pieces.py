@@ -14,7 +14,7 @@ import numpy as np
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
@@ -78,21 +78,6 @@ def bin_edges(
     return edges
 
 
-class Counter:
-    """Counts of section points: one histogram per parameter value and state."""
-
-    def __init__(self, n_points: int, edges: FloatArray) -> None:
-        self.edges = edges
-        self.counts = np.zeros((n_points, edges.shape[0], edges.shape[1] - 1), dtype=np.int32)
-        self.outside: IntArray = np.zeros((n_points, edges.shape[0]), dtype=np.int64)
-
-    def count(self, section: FloatArray, i: int) -> None:
-        """Add points (1, keep, n) to the histogram of parameter value i."""
-        from nonsmooth.kernels.histogram import count
-
-        count(section, 0, self.edges, self.counts[i], self.outside[i])
-
-
 PIECE = 16  # points of one piece of independent work
 
 
@@ -101,9 +86,11 @@ class Slot:
     loads by the names of those that are wanted."""
 
     def __init__(self, settler: Settler, at: FloatArray, edges: FloatArray | None, loads: Iterable[str]) -> None:
-        self.settler, self.at, points = settler, at, len(at)
+        self.settler, self.at, self.edges, points = settler, at, edges, len(at)
         self.loads = {name: np.full(points, np.nan) for name in loads}
-        self.counter = None if edges is None else Counter(points, edges)
+        if edges is not None:  # of one histogram for each parameter value and state
+            self.counts = np.zeros((points, len(edges), edges.shape[1] - 1), dtype=np.int32)
+            self.outside = np.zeros((points, len(edges)), dtype=np.int64)
         self.kept = settler.engine.kept(points, settler.keep if edges is None else 0)
         self.period_number = np.zeros(points, dtype=np.int64)
         self.residual, self.crossings, self.contacts = np.full((3, points), np.nan)
@@ -119,12 +106,14 @@ class Slot:
         stop: threading.Event,
     ) -> None:
         """Run some parameter values from a start, the state carried from each to the next or not, until ``stop``."""
+        from nonsmooth.kernels.histogram import count
+
         rows = np.array(order, dtype=np.int64)
         fit = self.settler.admissible(self.at[rows], np.tile(start, (len(rows), 1)), carried=carried)
         self.status[np.delete(rows, fit)] = codes.NO_CONVERGENCE
         advance(len(rows) - len(fit))
         rows, n = rows[fit], len(fit)
-        room: dict[str, Any] = {"kept": self.kept, "into": rows} if self.counter is None else {}
+        room: dict[str, Any] = {"kept": self.kept, "into": rows} if self.edges is None else {}
         mapper = Mapper(self.settler, tables, rows, np.tile(start, (n, 1)), **room)
         run, done = mapper.settle(self.settler.rules(), 2 * carried, False), 0
         try:
@@ -132,11 +121,11 @@ class Slot:
                 if stop.is_set():
                     return
                 run(j + 1)
-                if self.counter is not None:
+                if self.edges is not None:
                     for part, own in zip(self.kept[1:6], mapper.kept[1:6], strict=True):
                         part[i] = own[0]
                     if usable(mapper.jobs.status[j]):
-                        self.counter.count(mapper.kept.section, i)
+                        count(mapper.kept.section, 0, self.edges, self.counts[i], self.outside[i])
                 done = j + 1
                 advance(1)
         finally:
