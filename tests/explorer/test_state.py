@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import nonsmooth as ns
 from nonsmooth.explorer.catalogue import first_state, presets_of, slider_range
+from nonsmooth.explorer.figures import drawn
 from nonsmooth.explorer.labels import axis_label, html_of, number, plain_of
-from nonsmooth.explorer.raster import drawn
 from nonsmooth.explorer.state import CHOICES, History, PageState, changed, from_query, to_query
 
 SYSTEM = ns.models.discontinuous_support()

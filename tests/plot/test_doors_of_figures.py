@@ -12,7 +12,7 @@ import xarray as xr
 from tests.test_doors import WORDS, wrong
 
 import nonsmooth as ns
-from nonsmooth.plot import palette
+from nonsmooth.plot import style
 
 ROOMS = (ns.plot, ns.plot.identification)
 FIGURES = {name: one for room in ROOMS for name, one in vars(room).items() if hasattr(one, "door")}
@@ -106,7 +106,7 @@ def test_a_name_that_a_result_has_not_is_answered_with_those_it_has(drawn, case:
 
 
 def test_colours_of_many_modes_attractors_and_branches_do_not_repeat(drawn) -> None:
-    for colors in ([palette.nth(k) for k in range(60)], [palette.attractor_color(k) for k in range(60)]):
+    for colors in ([style.nth(k) for k in range(60)], [style.attractor_color(k) for k in range(60)]):
         rgb = np.array([plt.matplotlib.colors.to_rgb(one) for one in colors])
         apart = np.abs(rgb[:, None] - rgb[None]).max(axis=2)[~np.eye(60, dtype=bool)]
         assert apart.min() > 0.03

@@ -12,7 +12,7 @@ import xarray as xr
 import nonsmooth as ns
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import in_lines
-from nonsmooth.plot.palette import nth
+from nonsmooth.plot.style import nth
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ import nonsmooth as ns
 from nonsmooth.attractors.basin_fractions import basin_fractions
 from nonsmooth.attractors.basins import basins
 from nonsmooth.diagrams.chart import chart
-from nonsmooth.plot.palette import PERIODS, attractor_color
 from nonsmooth.plot.planes import basin_fractions as draw_fractions
 from nonsmooth.plot.planes import basins as draw_basins
 from nonsmooth.plot.planes import chart as draw_chart
 from nonsmooth.plot.planes import told_apart
+from nonsmooth.plot.style import PERIODS, attractor_color
 
 mpl.use("Agg")
 QUIET = {"progress": False}

@@ -69,10 +69,15 @@ def frequency_response(
         raise Interrupted(str(error), _response(system, error.result, parameter)) from error
 
 
+def forcing_parameters(system: System) -> list[str]:
+    """The parameters on which the forcing period depends."""
+    t = system.traced
+    return [name for name, p in zip(t.parameter_names, t.p, strict=True) if t.period and t.period.has(p)]
+
+
 def forcing_parameter(system: System) -> str:
     """The parameter that sets the forcing period; of several, or none, ``"omega"``."""
-    t = system.traced
-    known = [name for name, p in zip(t.parameter_names, t.p, strict=True) if t.period and t.period.has(p)]
+    known = forcing_parameters(system)
     return known[0] if len(known) == 1 else "omega"
 
 

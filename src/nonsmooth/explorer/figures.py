@@ -9,8 +9,11 @@ import numpy as np
 from bokeh.models import ColumnDataSource, CustomJSTickFormatter, HoverTool, NoOverlap, Range1d, Span
 from bokeh.plotting import figure
 from bokeh.themes import Theme
+from scipy.ndimage import maximum_filter1d
 
-from nonsmooth.explorer.labels import PREFIXES, axis_label, power_of
+from nonsmooth.arrays import FloatArray
+from nonsmooth.explorer.labels import axis_label
+from nonsmooth.plot.prefixes import PREFIXES, power_for
 from nonsmooth.plot.style import COLORS
 
 MOST = 64  # section points that are told apart one by one
@@ -64,7 +67,7 @@ class _Axis:
     title: Any = None  # of the figure, for the ordinate
 
     def name(self, latex: str, unit: str, of: str = "") -> None:
-        power = power_of(unit, self.range.start, self.range.end)
+        power = power_for(unit, max(abs(self.range.start), abs(self.range.end)))
         self.say(of + axis_label(latex, unit, power))
         text = "" if unit in ("", "1") else f" {PREFIXES[power]}{unit}"
         self.axis.formatter.args = {"power": power, "unit": text}
@@ -158,3 +161,31 @@ def extent(values: Any, margin: float = 0.06) -> tuple[float, float]:
     low, high = float(finite.min()), float(finite.max())
     room = margin * (high - low) or 0.1 * abs(high) or 1e-6
     return low - room, high + room
+
+
+#: A cloud: points (columns, n), a colour "#RRGGBB", and the height of a dot in pixels.
+Layer = tuple[FloatArray, str, int]
+_ALPHA = np.array([0, 150, 205, 255], dtype=np.uint32)  # of 0, 1, 2 and more points in a pixel
+
+
+def drawn(layers: list[Layer], low: float, high: float, height: int) -> Any:
+    """Return an RGBA image (height, columns), rows from below, of point clouds laid over each other.
+
+    A darker pixel holds more points: in chaos the image is the density.
+    """
+    columns = layers[0][0].shape[0] if layers else 1
+    image = np.zeros((height, columns), dtype=np.uint32)
+    if not high > low:
+        return image
+    for points, color, size in layers:
+        rows = np.floor((points - low) / (high - low) * height)
+        there = np.isfinite(rows) & (rows > -size) & (rows < height)
+        column = np.broadcast_to(np.arange(columns)[:, None], points.shape)[there]
+        counts = np.bincount(
+            rows[there].astype(np.int64).clip(0) * columns + column, minlength=height * columns
+        ).reshape(height, columns)
+        thick = maximum_filter1d(counts, size, axis=0, mode="constant")
+        red, green, blue = (int(color[i : i + 2], 16) for i in (1, 3, 5))
+        shade = _ALPHA[np.minimum(thick, 3)] << 24 | np.uint32(blue << 16 | green << 8 | red)
+        image = np.where(thick > 0, shade, image)
+    return image.astype(np.uint32)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.labels import plain_of, symbols_of
@@ -67,6 +66,11 @@ class Kind:
     axes: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, ViewSetting] = field(default_factory=dict)
 
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Its requests in their order."""
+        return self.quick + self.slow
+
 
 def _parameters(system: System, state: PageState) -> dict[str, str]:
     return {name: plain_of(symbols_of(system)[name]) for name in system.parameters}
@@ -91,14 +95,11 @@ def _across(factor: float) -> Callable[[System, PageState], float]:
     return default
 
 
-@lru_cache(maxsize=64)
-def _frequency(system: System) -> str:
+def _frequency(system: System, state: PageState) -> str:
     """The parameter that changes the period of the forcing; the first one where none does."""
-    if (period := system.period()) is not None:
-        for name, value in system.values.items():
-            if system.with_parameters({name: 1.01 * value}).period() != period:
-                return str(name)
-    return str(next(iter(system.parameters)))
+    from nonsmooth.diagrams.response import forcing_parameters
+
+    return (forcing_parameters(system) or [*system.parameters])[0]
 
 
 def _response(factor: float, end: str) -> Callable[[System, PageState], float]:
@@ -143,9 +144,7 @@ KINDS: Mapping[str, Kind] = {
         ("response", "frequency_response"),
         {"y": "shown"},
         {
-            "response.over": ViewSetting(
-                "over", lambda system, state: _frequency(system), _parameters, ("response.low", "response.high")
-            ),
+            "response.over": ViewSetting("over", _frequency, _parameters, ("response.low", "response.high")),
             "response.low": ViewSetting("from", _response(0.5, "low")),
             "response.high": ViewSetting("to", _response(1.5, "high")),
         },

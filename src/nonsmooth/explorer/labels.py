@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from sympy.printing.pretty.pretty_symbology import greek_unicode, sub
 
 from nonsmooth.plot.labels import with_unit
-from nonsmooth.plot.prefixes import PREFIXES, power_for, prefixed
+from nonsmooth.plot.prefixes import PREFIXES, prefixed
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -48,11 +48,6 @@ def parts_of(latex: str) -> tuple[str, str]:
     text = re.sub(r"\\(?:var)?([A-Za-z]+)", lambda found: greek_unicode.get(found[1], found[1]), text).replace("\\", "")
     stem, _, below = text.partition("_")
     return stem.strip("{}"), below.strip("{}").replace("{", "").replace("}", "")
-
-
-def power_of(unit: str, *values: float) -> int:
-    """The power of ten of the prefix in which values are read easily: see ``nonsmooth.plot.prefixes``."""
-    return power_for(unit, max((abs(value) for value in values), default=0.0))
 
 
 def axis_label(latex: str, unit: str, power: int = 0) -> str:

@@ -239,10 +239,10 @@ def frequency_of(system: System, values: Mapping[str, float], period: float) -> 
     now = forcing_period(system, values)
     if now is None:
         return {}
-    for name, value in values.items():
-        if not value or forcing_period(system, {**values, name: 1.01 * value}) == now:
-            continue
-        for other in (value * now / period, value * period / now):
+    from nonsmooth.diagrams.response import forcing_parameters
+
+    for name in forcing_parameters(system):
+        for other in (values[name] * now / period, values[name] * period / now):
             if abs((forcing_period(system, {**values, name: other}) or 0.0) - period) < 1e-9 * period:
                 return {name: other}
     return {}

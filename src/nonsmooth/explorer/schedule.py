@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.explorer.kinds import ORDER, QUICK
+from nonsmooth.explorer.kinds import KINDS, ORDER, QUICK
 from nonsmooth.explorer.worker import DEAF, Answer, Worker
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ class Schedule:
             self.page.sheet.forget(running.view)
         elif kind == "done":
             found, warned = content
-            stages = [stage for stage, view in ORDER.items() if view == ORDER[running.view]]
+            stages = KINDS[ORDER[running.view]].stages
             for finer in stages[stages.index(running.view) + 1 :]:  # of other values: it is drawn over
                 self.done.pop(finer, None)
             self.done[running.view] = running.key

@@ -11,11 +11,10 @@ from nonsmooth.explorer.catalogue import GIVEN, presets_of, slider_range
 from nonsmooth.explorer.kinds import KINDS, ORDER, SETTINGS, setting
 from nonsmooth.explorer.labels import html_of, plain_of, rows_of, symbols_of
 from nonsmooth.explorer.state import CHOICES, to_query
-from nonsmooth.explorer.views.motion import Mechanism, Portrait, Readout, SectionPoints, TimeHistory
+from nonsmooth.explorer.views.motion import AmplitudeSpectrum, Mechanism, Portrait, Readout, SectionPoints, TimeHistory
 from nonsmooth.explorer.views.over_parameters import Branches, Diagram, Response
 from nonsmooth.explorer.views.planes import Basins, Chart
 from nonsmooth.explorer.views.recording import RecordingOverlay
-from nonsmooth.explorer.views.spectrum import AmplitudeSpectrum
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.schedule import Asked
@@ -85,7 +84,7 @@ class Sheet:
     def undo(self, *views: str) -> None:
         """Ask for the results of views again."""
         for name in views:
-            for stage in (*KINDS[name].quick, *KINDS[name].slow):
+            for stage in KINDS[name].stages:
                 self.page.work.done.pop(stage, None)
 
     def follow(self) -> None:

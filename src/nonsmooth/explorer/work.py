@@ -251,11 +251,6 @@ def _around(job: Job, names: tuple[str, str]) -> list[float]:
     return ends
 
 
-def _spectrum(job: Job) -> Results:
-    """An ``amplitude_spectrum``."""
-    return {"spectrum": job.run(ns.amplitude_spectrum, start=job["start"])}
-
-
 _WORK: dict[str, Callable[[Job], Results]] = {
     "orbit": _orbit,
     "section": _section,
@@ -268,7 +263,7 @@ _WORK: dict[str, Callable[[Job], Results]] = {
     "response": _response,
     **dict.fromkeys(_CHARTS, _chart),
     **dict.fromkeys(_BASINS, _basins),
-    "spectrum": _spectrum,
+    "spectrum": lambda job: {"spectrum": job.run(ns.amplitude_spectrum, start=job["start"])},
     "recording": lambda job: {"laid": laid_over(job)},
     "fit": fitted,
 }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.plot import palette, style
+from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, columns, in_lines, name_and_unit, name_axes, name_plane, one_of, only_states
 from nonsmooth.plot.prefixes import PREFIXES, power_for
@@ -183,23 +183,23 @@ def _title(ax: Axes, words: str) -> None:
 def classes_of(result: xr.Dataset) -> tuple[Any, list[tuple[str, str]]]:
     """Classes of a chart as numbers, and the words and the colour of each."""
     period, told = result["period_number"].values.astype(int), in_words(result["status"])
-    most = max(int(period.max(initial=0)), len(palette.PERIODS))
-    colors = [*palette.PERIODS, *[palette.LONGER] * (most - len(palette.PERIODS))]
+    most = max(int(period.max(initial=0)), len(style.PERIODS))
+    colors = [*style.PERIODS, *[style.LONGER] * (most - len(style.PERIODS))]
     entries = [(f"period {p}", color) for p, color in enumerate(colors, start=1)]
     unknown = np.where(told == "not_periodic", most, most + 1)
     return np.where(period > 0, period - 1, unknown), [
         *entries,
-        ("no period", palette.NO_PERIOD),
-        ("not settled", palette.UNKNOWN),
+        ("no period", style.NO_PERIOD),
+        ("not settled", style.UNKNOWN),
     ]
 
 
 def legend_of(classes: Any, entries: list[tuple[str, str]]) -> list[tuple[str, str]]:
     """Words and colour of the classes that are there; long periods are one."""
-    above = f"above {len(palette.PERIODS)}"
+    above = f"above {len(style.PERIODS)}"
     there = (entries[k] for k in np.unique(classes))
     return [
-        (above if color == palette.LONGER else words.removeprefix("period "), color)
+        (above if color == style.LONGER else words.removeprefix("period "), color)
         for color, words in {color: words for words, color in there}.items()
     ]
 
@@ -230,8 +230,8 @@ def basins(ax: Axes, result: xr.Dataset, *, size: Positive = 3.6) -> None:
 
     first, second = (str(dim) for dim in result["label"].dims)
     labels = result["label"].transpose(second, first).values
-    colors = [palette.attractor_color(k) for k in range(result.sizes["attractor"])]
-    fates = [palette.DIVERGED, palette.UNKNOWN]
+    colors = [style.attractor_color(k) for k in range(result.sizes["attractor"])]
+    fates = [style.DIVERGED, style.UNKNOWN]
     cells(ax, result[first].values, result[second].values, np.maximum(labels, -2), [*fates, *colors], -2)
     ax.axis(ax.axis())  # the cells fill the axes, whatever lies on them
     handles: list[Any] = []
@@ -300,13 +300,13 @@ def basin_fractions(ax: Axes, result: xr.Dataset, *, y: Name | None = None) -> N
     result = result.sortby(parameter)
     values, fraction = result[parameter].values, result["fraction"].values
     names = told_apart([_along(result, k) for k in range(result.sizes["attractor"])])
-    colors = [palette.attractor_color(k) for k in range(len(names))]
+    colors = [style.attractor_color(k) for k in range(len(names))]
     edge: style.Properties = {"edgecolor": "black", "linewidth": 0.3}
     ax.margins(x=0)
     if y is None:
         shares = [*fraction.T, (result["not_converged"] + result["diverged"]).values]
         if shares[-1].any():
-            names, colors = [*names, "none reached"], [*colors, palette.UNKNOWN]
+            names, colors = [*names, "none reached"], [*colors, style.UNKNOWN]
         ax.stackplot(values, *(100 * one for one in shares[: len(names)]), colors=colors, labels=names, **edge)
         ax.set(ylabel="share of starts (%)", ylim=(0, 100))
         name_axes(ax, name_and_unit(result, parameter))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.plot import palette, style
+from nonsmooth.plot import style
 from nonsmooth.plot.branches import check_axis, draw_branch
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
@@ -89,7 +89,7 @@ def bifurcation(
         cloud = result[parameter].values, mine.transpose(..., parameter).values
         style.cloud(ax, cloud, size * (_SEAM if under else 1.0), shade, words)
     for k, one in enumerate(over):
-        draw_branch(ax, one, y=name, color=palette.nth(k, _LINES), behind=True)
+        draw_branch(ax, one, y=name, color=style.nth(k, _LINES), behind=True)
     _whole(ax, result[parameter].values)
     _name(ax, result, parameter, name, points)
     if len(directions) > 1 or over:

@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import unknown
-from nonsmooth.plot import palette, style
+from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
     Name,
@@ -119,7 +119,7 @@ def phase_portrait(
     for k, (xs, ys) in enumerate(pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)):
         if np.isfinite(xs).any():
             words = in_lines(modes[k].replace("_", " "), 60)  # of a legend's line
-            ax.plot(xs, ys, color=palette.nth(k), label=words, zorder=2 + 0.1 * k)
+            ax.plot(xs, ys, color=style.nth(k), label=words, zorder=2 + 0.1 * k)
     if section is not None:
         variable_along(section, "section", "poincare or sweep")
         x_points, y_points = map(np.ravel, columns(section, "section", names))

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.explorer.figures import BLUE, GREY, INK, Panel, cells_of, extent
+from nonsmooth.explorer.figures import BLUE, GREY, INK, Layer, Panel, cells_of, drawn, extent
 from nonsmooth.explorer.labels import number
-from nonsmooth.explorer.raster import Layer, drawn
 from nonsmooth.explorer.schedule import key_of
 from nonsmooth.explorer.state import CHOICES
 from nonsmooth.explorer.views.view import Ends, Legend, Request, Requests, Results, View

@@ -14,7 +14,7 @@ from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.figures import Panel, cells_of
 from nonsmooth.explorer.views.motion import Portrait
 from nonsmooth.explorer.views.view import Ends, Legend, Request, Requests, Results, View
-from nonsmooth.plot import palette
+from nonsmooth.plot import style
 from nonsmooth.plot.planes import classes_of, legend_of, names_of
 from nonsmooth.plot.style import COLORS
 
@@ -198,10 +198,10 @@ class Basins(CellImage):
         size, periods = np.array([np.ptp(x), np.ptp(y)]), result["period_number"].values
         numbers = self._numbers([(int(period), points[of == k] / size) for k, period in enumerate(periods)])
         entries = [
-            ("diverged", palette.DIVERGED),
-            ("none reached", palette.UNKNOWN),
+            ("diverged", style.DIVERGED),
+            ("none reached", style.UNKNOWN),
             *(
-                (f"{name}: {100 * share:.3g} %", palette.attractor_color(number))
+                (f"{name}: {100 * share:.3g} %", style.attractor_color(number))
                 for name, share, number in zip(names_of(result), result["fraction"].values, numbers, strict=True)
             ),
         ]

@@ -101,7 +101,7 @@ class View:
 
     def each(self, request: Request) -> Requests:
         """The same request for every stage."""
-        return {stage: {**request, "view": stage} for stage in (*self.kind.quick, *self.kind.slow)}
+        return {stage: {**request, "view": stage} for stage in self.kind.stages}
 
     def build(self) -> None:
         """Make the figure."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.plot import palette, style
+from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, picture
 from nonsmooth.plot.sweeps import MARKERS
@@ -68,7 +68,7 @@ def nyquist(one: Picture, finding: Any) -> None:
     lengths, crank, real, imaginary = one.values("crank_length", "crank", "fitted_real", "fitted_imaginary")
     for k, length in enumerate(lengths):
         mark = _CRANKS[k % len(_CRANKS)]
-        one.line(real[k], imaginary[k], f"fitted, crank {1e3 * length:.4g} mm", palette.nth(k), linewidth=0.9)
+        one.line(real[k], imaginary[k], f"fitted, crank {1e3 * length:.4g} mm", style.nth(k), linewidth=0.9)
         here, label = np.isclose(crank, length), f"{one.word}, {1e3 * length:.4g} mm"
         one.points("real", "imaginary", label, where=here, mark=mark, face="white")
     for axis in (one.ax.axhline, one.ax.axvline):

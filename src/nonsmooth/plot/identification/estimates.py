@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from nonsmooth.errors import unknown
-from nonsmooth.plot import palette, style
+from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
 from nonsmooth.plot.labels import symbol_of
@@ -186,7 +186,7 @@ def _over_time(one: Picture, part: Any) -> None:
     for k, m in enumerate(np.unique(mode)):
         inside = (mode == m) & np.append(np.diff(window) == 0, False)
         line = np.where(inside | np.roll(inside, 1), fitted, np.nan)
-        one.line(time, line, f"fit: {modes[int(m)].replace('_', ' ')}", palette.nth(k), linewidth=0.9)
+        one.line(time, line, f"fit: {modes[int(m)].replace('_', ' ')}", style.nth(k), linewidth=0.9)
     one.residual(time, residual)
     near = part["place"].values >= len(modes)
     if near.any():
