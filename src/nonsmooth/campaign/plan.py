@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 
@@ -66,7 +65,7 @@ class Plan:
         return "\n".join(lines)
 
 
-def plan(work: ChunkedWork, *, seconds: float = SECONDS, seed: int = 0, kept: int | None = None) -> Plan:
+def plan(work: ChunkedWork, *, seconds: float = SECONDS, kept: int | None = None) -> Plan:
     """Run some chunks for some seconds of processor time, one after the other, and scale up.
 
     The first chunk is run once before the clock: it compiles and loads what all need.
@@ -79,7 +78,8 @@ def plan(work: ChunkedWork, *, seconds: float = SECONDS, seed: int = 0, kept: in
     from nonsmooth.campaign.store import stored_bytes
 
     n = work.n_chunks()
-    order = _spread(n, seed)
+    # an order whose every beginning lies evenly over the whole, by multiples of the golden ratio from a random place on
+    order = np.argsort((np.random.default_rng(0).random() + GOLDEN * np.arange(n)) % 1.0)
     work.compute(int(order[0]))
     per_place, samples = [], {}
     began, spent = time.perf_counter(), 0.0
@@ -110,15 +110,6 @@ def scaled_up(per_place: Sequence[float], places: int, rest: float) -> tuple[flo
     """Seconds of all places, and their standard error, from samples; ``rest`` is the part that was not sampled."""
     error = float(np.std(per_place)) / max(len(per_place) - 1, 1) ** 0.5 * rest**0.5
     return places * float(np.mean(per_place)), places * error
-
-
-def _spread(n: int, seed: int) -> Any:
-    """All chunks in an order whose every beginning lies evenly over the whole: by multiples of the golden ratio.
-
-    The cost of a point changes from region to region; an even sample knows its mean better than a random one.
-    """
-    begin = np.random.default_rng(seed).random()
-    return np.argsort((begin + GOLDEN * np.arange(n)) % 1.0)
 
 
 def _resident() -> int:

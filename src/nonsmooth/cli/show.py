@@ -110,13 +110,12 @@ def _origin(record: Mapping[str, Any], result: xr.Dataset) -> list[str]:
 def _statuses(result: xr.Dataset) -> str:
     import numpy as np
 
-    from nonsmooth.results.labels import STATUSES
+    from nonsmooth.results.labels import BY_CODE
 
-    known = {status.code: status for status in STATUSES}
     codes, counts = np.unique(result["status"].values, return_counts=True)
-    if result["status"].size == 1 and (status := known.get(codes.tolist()[0])):
+    if result["status"].size == 1 and (status := BY_CODE.get(codes.tolist()[0])):
         return f"{status.name}: {status.sentence}"
-    names = (known[code].name if code in known else f"{one_line(code)} (unknown)" for code in codes.tolist())
+    names = (BY_CODE[code].name if code in BY_CODE else f"{one_line(code)} (unknown)" for code in codes.tolist())
     return ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
 
 

@@ -131,7 +131,23 @@ def amplitude_spectrum(
     if len(values) % 2 == 0:
         amplitude[-1] /= 2.0
     frequency = np.arange(len(amplitude), dtype=np.float64) * (rate / len(values))
-    return _dataset(system, engine.name, asked, frequency, amplitude, base, count)
+    from nonsmooth.results.labels import labelled, labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.schema import dataset
+
+    labels = labels_of(system)
+    per = "per iterate" if labels.is_map else "Hz" if labels.time_unit == "s" else "1"
+    return dataset(
+        labels,
+        provenance(labels, "amplitude_spectrum", asked, method=engine.name),
+        {
+            "amplitude": labelled(("frequency", "state"), amplitude, "amplitude"),
+            "base_frequency": labelled((), base, "frequency of the forcing, or of the returns", per),
+            "period_number": labelled((), np.int64(count), "period number (0: none found)"),
+        },
+        frequency=labelled("frequency", frequency, "frequency", per),
+        order=labelled("frequency", frequency / base, "frequency over the base frequency"),
+    )
 
 
 def _period_number(system: System, engine: Engine, section: Any, start: Any, transient: int) -> int:
@@ -161,31 +177,3 @@ def _sampled(system: System, start: Any, begin: float, span: float, number: int,
     run = simulate(system, duration=span * (1.0 + 1e-12), transient=begin, start=start, samples=times, **how)
     at = np.searchsorted(run["time"].values, times).clip(0, run.sizes["time"] - 1)
     return np.asarray(run["u"].values[at])
-
-
-def _dataset(
-    system: System,
-    method: str,
-    options: dict[str, Any],
-    frequency: FloatArray,
-    amplitude: FloatArray,
-    base: float,
-    count: int,
-) -> xr.Dataset:
-    from nonsmooth.results.labels import labelled, labels_of
-    from nonsmooth.results.provenance import provenance
-    from nonsmooth.results.schema import dataset
-
-    labels = labels_of(system)
-    per = "per iterate" if labels.is_map else "Hz" if labels.time_unit == "s" else "1"
-    return dataset(
-        labels,
-        provenance(labels, "amplitude_spectrum", options, method=method),
-        {
-            "amplitude": labelled(("frequency", "state"), amplitude, "amplitude"),
-            "base_frequency": labelled((), base, "frequency of the forcing, or of the returns", per),
-            "period_number": labelled((), np.int64(count), "period number (0: none found)"),
-        },
-        frequency=labelled("frequency", frequency, "frequency", per),
-        order=labelled("frequency", frequency / base, "frequency over the base frequency"),
-    )

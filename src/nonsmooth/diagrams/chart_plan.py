@@ -43,7 +43,7 @@ class GpuPlan:
         return f"gpu         {duration(self.seconds)} on {self.name} ({how})"
 
 
-def plan_on_gpu(work: ChartWork, *, seconds: float = 5.0, seed: int = 0) -> GpuPlan:
+def plan_on_gpu(work: ChartWork, *, seconds: float = 5.0) -> GpuPlan:
     """Run some of a chart's points on the GPU for some seconds, and scale up.
 
     Parameters
@@ -55,7 +55,7 @@ def plan_on_gpu(work: ChartWork, *, seconds: float = 5.0, seed: int = 0) -> GpuP
     if work.carried:
         return _carried(work, n)
     size = min(max(batch_size() // len(work.starts), 1), n)
-    blocks, begin = -(-n // BLOCK), float(np.random.default_rng(seed).random())
+    blocks, begin = -(-n // BLOCK), float(np.random.default_rng(0).random())
     _took(work, _sample(n, begin, range(1)))  # compiles and loads what all need
     count, spent, sampled = -(-size // BLOCK), 0.0, 0
     per_place: list[float] = []

@@ -19,6 +19,7 @@ import numpy as np
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import Range, at_least, float_array
 
@@ -98,19 +99,19 @@ def correlation_dimension(
     error = np.nan if covariance is None else float(np.hypot(np.sqrt(covariance[0, 0]), _drift(a, b)))
     return xr.Dataset(
         {
-            "dimension": ((), float(dimension), {"long_name": "correlation dimension"}),
-            "standard_error": ((), error, {"long_name": "standard error: of the fit, and of the slope's drift"}),
-            "range_low": ((), low, {"long_name": "smallest distance of the scaling range"}),
-            "range_high": ((), high, {"long_name": "largest distance of the scaling range"}),
-            "decades": ((), decades, {"long_name": "width of the scaling range"}),
-            "slope_spread": ((), spread, {"long_name": "standard deviation of the slope in the range"}),
-            "scaling": ((), np.int8(found), {"long_name": "whether there is a scaling range"}),
+            "dimension": labelled((), float(dimension), "correlation dimension"),
+            "standard_error": labelled((), error, "standard error: of the fit, and of the slope's drift"),
+            "range_low": labelled((), low, "smallest distance of the scaling range"),
+            "range_high": labelled((), high, "largest distance of the scaling range"),
+            "decades": labelled((), decades, "width of the scaling range"),
+            "slope_spread": labelled((), spread, "standard deviation of the slope in the range"),
+            "scaling": labelled((), np.int8(found), "whether there is a scaling range"),
             "n_points": ((), len(x)),
-            "correlation_sum": ("radius", pairs / total, {"long_name": "part of the pairs nearer than r"}),
-            "n_pairs": ("radius", pairs, {"long_name": "number of pairs nearer than r"}),
-            "local_slope": ("radius", slope, {"long_name": "d log C / d log r over half a decade"}),
+            "correlation_sum": labelled("radius", pairs / total, "part of the pairs nearer than r"),
+            "n_pairs": labelled("radius", pairs, "number of pairs nearer than r"),
+            "local_slope": labelled("radius", slope, "d log C / d log r over half a decade"),
         },
-        {"radius": ("radius", radius, {"long_name": "distance in units of the states' scale"})},
+        {"radius": labelled("radius", radius, "distance in units of the states' scale")},
     )
 
 

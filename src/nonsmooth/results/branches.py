@@ -206,16 +206,14 @@ def diagram(
         room = {dim: (0, most - whole.sizes[dim]) for dim, most in longest.items()}
         parts.append(whole.pad(room, constant_values=np.nan))
         offset += n
-    marks = [part[[name for name in part if "special" in part[name].dims]] for part in parts]
-    joined = {"point": [part.drop_dims("special") for part in parts], "special": marks}
-    once: dict[str, Any] = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
-    result = xr.merge(
-        [
-            xr.concat(some, dim, **once).drop_vars(parameter if dim == "special" else [], errors="ignore")
-            for dim, some in joined.items()
-        ],
-        compat="override",
-    )
+    joined = {
+        name: xr.Variable.concat([part.variables[name] for part in parts], dim)
+        for dim in ("point", "special")
+        for name, one in parts[0].variables.items()
+        if dim in one.dims
+    }
+    along = {parameter: joined.pop(parameter), **parts[0].drop_dims(["point", "special"]).coords}
+    result = xr.Dataset(joined, along)
     result["signature"].attrs |= flag_attributes(list(known["signature"]), dtype=np.int32)
     result["mode"].attrs |= flag_attributes(labels.modes, dtype=result["mode"].dtype)
     of_sweeps = {name: swept[name].transpose("direction", parameter, ...) for name in ("section", "period_number")}

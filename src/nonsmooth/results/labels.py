@@ -178,13 +178,13 @@ STATUSES: tuple[Status, ...] = (
 #: What a run can rest at; "undecided": an equilibrium whose eigenvalues do not say whether it is stable.
 EQUILIBRIA = ("none", "stable", "unstable", "undecided")
 
-_BY_CODE = {status.code: status for status in STATUSES}
+BY_CODE = {status.code: status for status in STATUSES}
 _BY_NAME = {status.name: status for status in STATUSES}
 
 
 def by_code(code: int) -> Status:
     """The status of a kernel's integer; KeyError for a code that never reaches a result."""
-    return _BY_CODE[int(code)]
+    return BY_CODE[int(code)]
 
 
 def by_name(name: str) -> Status:

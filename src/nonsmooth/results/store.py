@@ -272,13 +272,9 @@ def _encode(result: xr.Dataset) -> xr.Dataset:
     encoded = result.drop_encoding()
     for name, variable in list(encoded.variables.items()):
         if variable.dtype.kind == "c":
-            encoded[name] = _split(encoded[name])
+            parts = xr.concat([encoded[name].real, encoded[name].imag], dim="part").transpose(..., "part")
+            encoded[name] = parts.assign_coords(part=["re", "im"]).assign_attrs(variable.attrs)
     return encoded
-
-
-def _split(array: xr.DataArray) -> xr.DataArray:
-    parts = xr.concat([array.real, array.imag], dim="part").transpose(..., "part")
-    return parts.assign_coords(part=["re", "im"]).assign_attrs(array.attrs)
 
 
 def _netcdf_encoding(result: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
@@ -301,14 +297,10 @@ def _decoded(raw: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
             words = np.array(variable.values.tolist(), dtype=str).reshape(variable.shape)
             variable = xr.Variable(variable.dims, words, variable.attrs)
         elif variable.dims[-1:] == ("part",):
-            variable = _join(variable)
+            parts = variable.values
+            values = np.empty(parts.shape[:-1], np.result_type(parts.dtype, np.complex64))
+            values.real, values.imag = parts[..., 0], parts[..., 1]
+            variable = xr.Variable(variable.dims[:-1], values, variable.attrs)
         if "flag_values" in variable.attrs:
             variable.attrs["flag_values"] = np.atleast_1d(np.asarray(variable.attrs["flag_values"], variable.dtype))
         yield str(name), name in raw.coords, variable
-
-
-def _join(variable: xr.Variable) -> xr.Variable:
-    parts = variable.values
-    values = np.empty(parts.shape[:-1], np.result_type(parts.dtype, np.complex64))
-    values.real, values.imag = parts[..., 0], parts[..., 1]
-    return xr.Variable(variable.dims[:-1], values, variable.attrs)
