@@ -121,13 +121,45 @@ def test_its_text_is_read_back_whatever_it_has_visited(both: tuple[ns.System, ns
     before = made.to_text()
     ns.simulate(made, periods=2)
     assert made.to_text() == before
-    for again in (ns.System.from_text(before), pickle.loads(pickle.dumps(made))):
-        assert again == made and len(again.modes) == 1
+    sent = pickle.loads(pickle.dumps(made))
+    for again, modes in ((ns.System.from_text(before), made.modes[:1]), (sent, made.modes)):
+        assert again == made and again.modes == modes
         runs = [ns.simulate(system, periods=2, samples=9) for system in (made, again)]
         assert np.allclose(*(run["u"].values for run in runs), rtol=0, atol=1e-14)
         with pytest.raises(ns.SystemDefinitionError, match="lies between 0 and 1"):
             again.with_parameters(e=-0.1)
     assert 'wall: Stop(at="q2"' in repr(made) and "visited so far" in repr(made)
+
+
+def hardening() -> ns.System:
+    """A mass on a cubic spring between a wall and a second mass that it may strike."""
+    return ns.System(
+        states=["a", "b", "v", "w"],
+        parameters={"F": 1.2},
+        modes={
+            "free": lambda t, u, p: (
+                u.v,
+                u.w,
+                p.F * np.cos(t) - u.a - u.a**3 - 0.1 * u.v - (u.a - u.b),
+                u.a - u.b - 0.1 * u.w,
+            )
+        },
+        elements={
+            "wall": Stop(gap=lambda t, u, p: 0.4 - u.a, on={"v": -1.0}, restitution=0.0),
+            "between": Stop(gap=lambda t, u, p: 0.2 - u.b + u.a, on={"w": -1.0, "v": 1.0}, restitution=0.3),
+        },
+    )
+
+
+@pytest.mark.parametrize(("system", "decided"), [(pair, "patterns"), (hardening, "decider")])
+def test_an_orbit_is_the_same_in_another_process(system: Any, decided: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Modes and answers have the numbers of their first visits: they travel with what is told by them."""
+    monkeypatch.setattr(combinations, "MOST", 0 if decided == "patterns" else combinations.MOST)
+    orbit = ns.find_orbit(system())
+    assert getattr(orbit.system.traced, decided) is not None and len(orbit.crossing_times)
+    there = pickle.loads(pickle.dumps(orbit))
+    assert repr(there) == repr(orbit) and there.crossings_per_period == orbit.crossings_per_period
+    np.testing.assert_array_equal(there.trajectory()["u"], orbit.trajectory()["u"])
 
 
 def test_a_slow_start_of_a_preloaded_spring_that_cannot_hold(monkeypatch: pytest.MonkeyPatch) -> None:

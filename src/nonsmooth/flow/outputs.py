@@ -66,7 +66,7 @@ def out_of_bounds(traced: Traced, points: FloatArray, high: FloatArray, low: Flo
 
     Elements that bear one load together share it by least norm within their bounds; kernels know nothing of these."""
     found = np.zeros(high.shape, dtype=bool)
-    known = traced.patterns or traced.decider
+    known = traced.known
     if known is None or known.make.rubbing:
         return found
     make, mode = known.make, next(iter(known.make.fields))

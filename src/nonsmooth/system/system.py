@@ -390,7 +390,11 @@ class System(Answering):
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return System.from_text, (self.to_text(),)
+        known = self.traced.known
+        return System.from_text, (self.to_text(),), known and known.sent()
+
+    def __setstate__(self, sent: Any) -> None:
+        self.traced.known.receive(sent)
 
     def __repr__(self) -> str:
         return table(self, whole=False)

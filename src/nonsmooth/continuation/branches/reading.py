@@ -148,7 +148,7 @@ def hopf_row(start: xr.Dataset) -> tuple[System, str, RestRecord, Any]:
 def layout_attributes(signatures: Iterable[Signature], system: System) -> dict[str, str]:
     """The table of signatures as attributes; of transitions that were found on the way what they are, by number."""
     layouts = [one.data for one in signatures]
-    attrs, known = {"layouts": json.dumps(layouts)}, system.traced.patterns or system.traced.decider
+    attrs, known = {"layouts": json.dumps(layouts)}, system.traced.known
     if known is not None:
         visits = [Visit(*data) for one in layouts for data in one]
         modes = {v.mode: known.told_mode(v.mode) for v in visits}
@@ -159,7 +159,7 @@ def layout_attributes(signatures: Iterable[Signature], system: System) -> dict[s
 
 def layouts_of(dataset: xr.Dataset, system: System) -> list[Signature]:
     """The table of signatures, each one a way that the system's transitions allow."""
-    known: Any = system.traced.patterns or system.traced.decider
+    known = system.traced.known
     told = ({}, {}) if known is None else json.loads(dataset.attrs.get("visited", "[{}, {}]"))
     modes = {int(k): known.retold_mode(data) for k, data in told[0].items()}
     jumps = {int(k): known.retold(*data) for k, data in told[1].items()}

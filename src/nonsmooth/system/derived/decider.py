@@ -147,6 +147,15 @@ class Decider:
         """The number of an answer that was told."""
         return self.found(int(asked), int(target), tuple(map(int, struck)), some and tuple(map(int, some)))
 
+    def sent(self) -> Any:
+        """All answers found so far, as data: in another process they get the same numbers."""
+        return [*self._found]
+
+    def receive(self, sent: Any) -> None:
+        """Number what was sent, in its order."""
+        for answer in sent:
+            self.found(*answer)
+
     def number(self, mode: str, pattern: Pattern) -> int:
         """The number of a combination of phases."""
         if (mode, pattern) not in self.numbers:

@@ -335,6 +335,17 @@ class Patterns:
         change = change and Reset(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
         return self.transition(Lead(ends[0], ends[1], str(element), given, str(kind), change))
 
+    def sent(self) -> Any:
+        """All transitions and modes found so far, as data: in another process they get the same numbers."""
+        return [*self._jumped], [*self.visited]
+
+    def receive(self, sent: Any) -> None:
+        """Number what was sent, in its order."""
+        for pattern in sent[1]:
+            self.number(pattern)
+        for lead in sent[0]:
+            self.transition(lead)
+
     def named(self, name: str) -> int | None:
         """The number of the pattern of a name; None where there is none."""
         ends: dict[str, Pattern] = {name: ()}  # what is left of the name, and the phases read

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -110,7 +110,12 @@ class Traced:
     @property
     def asks(self) -> bool:
         """Return whether elements are asked what they do together (:mod:`nonsmooth.system.derived.deciding`)."""
-        return self.decider is not None or self.patterns is not None
+        return self.known is not None
+
+    @property
+    def known(self) -> Any:
+        """The keeper of modes and transitions found on the way; None where all stand from the first."""
+        return self.patterns or self.decider
 
     def __hash__(self) -> int:
         """A hash of names and counts: one of all expressions takes milliseconds where there are many modes."""
