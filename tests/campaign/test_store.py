@@ -21,6 +21,7 @@ from nonsmooth.campaign.plan import plan
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.store import describe_store, open_store
 from nonsmooth.campaign.work import difference
+from nonsmooth.cli.main import main
 from nonsmooth.diagrams.chart import chart, plan_chart
 from nonsmooth.errors import DataFileError
 
@@ -47,6 +48,22 @@ def test_a_store_holds_the_same_and_is_gone_on_with(tmp_path: Path) -> None:
     other = tmp_path / "other.zarr"
     run(work, threads=1, store=other, **QUIET)
     assert hashes(path) == hashes(other) and len(hashes(path)) > 30
+
+
+def test_ctrl_c_says_what_is_kept_and_that_it_can_be_gone_on_with(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "squares.zarr"
+
+    def interrupted() -> dict[str, np.ndarray]:
+        return run(Squares(), threads=1, store=path, progress=lambda share: share < 0.3)
+
+    said = f"cancelled by the function given as progress: 5 of 15 chunks are kept in {path}; run it again to go on"
+    with pytest.raises(KeyboardInterrupt) as told:
+        interrupted()
+    assert str(told.value) == said and describe_store(path)["done"] == 5
+    monkeypatch.setattr("nonsmooth.models.names", interrupted)
+    assert main(["models"]) == 130 and f"of 15 chunks are kept in {path}" in capsys.readouterr().err
 
 
 def test_a_chunk_cut_short_is_computed_again(tmp_path: Path) -> None:

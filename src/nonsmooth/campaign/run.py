@@ -75,21 +75,27 @@ def run(
         columns |= empty_columns(work)
     size = places_of(work)
     before = size - sum(last - first for first, last in map(work.bounds, missing))
-    with progress_bar(size, label, progress, before) as advance:
+    try:
+        with progress_bar(size, label, progress, before) as advance:
 
-        def keep(chunk: int, arrays: Columns | None) -> None:
-            first, last = work.bounds(chunk)
-            if keeper is None and arrays is not None:
-                for name, values in arrays.items():
-                    columns[name][first:last] = values
-            advance(last - first)
+            def keep(chunk: int, arrays: Columns | None) -> None:
+                first, last = work.bounds(chunk)
+                if keeper is None and arrays is not None:
+                    for name, values in arrays.items():
+                        columns[name][first:last] = values
+                advance(last - first)
 
-        if client is not None:
-            on_cluster(work, missing, keep, client, keeper)
-        else:
-            if missing:
-                work.load()
-            over_items(missing, work.compute if keeper is None else partial(keeper.compute, work), keep, threads)
+            if client is not None:
+                on_cluster(work, missing, keep, client, keeper)
+            else:
+                if missing:
+                    work.load()
+                over_items(missing, work.compute if keeper is None else partial(keeper.compute, work), keep, threads)
+    except KeyboardInterrupt as error:
+        if keeper is None:
+            raise
+        kept = f"{len(keeper.done())} of {work.n_chunks()} chunks are kept in {store}; run it again to go on"
+        raise KeyboardInterrupt(f"{str(error) or 'interrupted'}: {kept}") from error
     return columns if keeper is None else keeper.read(work)
 
 

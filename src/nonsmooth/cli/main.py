@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, completion, explore, identify, init, models, plan, reproduce, rig, run, schema, show
 from nonsmooth.cli.terminal import printable
-from nonsmooth.errors import SolveError, shortened, unknown
+from nonsmooth.errors import Interrupted, SolveError, shortened, unknown
 
 _COMMANDS = (init, run, plan, show, explore, models, identify, compare, reproduce, rig, schema, completion)
 #: What a user can have caused and mend; anything else is a fault of the package.
@@ -66,8 +66,9 @@ def _answer(arguments: Sequence[str] | None) -> int:
         with _fit_for_a_terminal():
             code: int = options.run(options)
         return code
-    except KeyboardInterrupt:
-        print("nonsmooth: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        kept = "" if isinstance(error, Interrupted) else str(error)
+        print("nonsmooth:", kept or "interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         raise

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
@@ -48,12 +47,7 @@ def run(options: argparse.Namespace) -> int:
     if store and "data" in study.output and store.resolve() == (study.path.parent / study.output["data"]).resolve():
         raise ValueError(f"--store {store} is where the result is to be written (data): give another name")
     with nullcontext() if options.scheduler is None else connect(options.scheduler) as client:
-        try:
-            result = study.compute(progress=not options.quiet, store=store, client=client)
-        except KeyboardInterrupt:
-            if store:
-                print(f"\nfinished chunks are kept in {store}; the same command goes on", file=sys.stderr)
-            raise
+        result = study.compute(progress=not options.quiet, store=store, client=client)
     seconds = time.perf_counter() - began
     written = study.write(result)
     if not options.quiet:
