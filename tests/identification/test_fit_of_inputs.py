@@ -88,7 +88,7 @@ def test_a_run_that_begins_at_rest_in_a_mode_that_slips() -> None:
 
 
 def test_models_with_an_input_are_ranked_by_what_they_predict() -> None:
-    """The channel has the input's name; the damping that is there predicts better than none."""
+    """The channel has the input's name, or is named; the damping that is there predicts better than none."""
     t = np.arange(0.0, 12.0, 0.02)
     force = np.sin(2.0 * t) + np.sin(5.3 * t)
     free = ns.System(
@@ -101,7 +101,13 @@ def test_models_with_an_input_are_ranked_by_what_they_predict() -> None:
     noise = 1e-4 * np.random.default_rng(0).standard_normal(run.sizes["time"])
     record = {"x": (run["time"].values, run["u"].sel(state="x").values + noise), "f": (t, force)}
     models = {"damped": (free, ["k", "c"]), "free": (free.with_parameters(c=0.0), ["k"])}
-    assert ns.select_model(models, record, measured=["x"], folds=2, tries=1, progress=False).attrs["best"] == "damped"
+    asked: dict[str, Any] = {"measured": ["x"], "folds": 2, "tries": 1, "progress": False}
+    ranked = ns.select_model(models, record, **asked)
+    assert ranked.attrs["best"] == "damped"
+    record["load cell"] = record.pop("f")
+    assert ns.select_model(models, record, inputs={"f": "load cell"}, **asked).identical(ranked)
+    with pytest.raises(ValueError, match="'f' is missing; .* beside a recording also by the name of a channel"):
+        ns.select_model(models, record, **asked)
 
 
 SLOW = (pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6))

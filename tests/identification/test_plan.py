@@ -124,6 +124,30 @@ def test_a_parameter_that_a_run_sets_is_known_there_alone() -> None:
     assert np.isinf(found.sel(run="set", parameter="k")) and np.isfinite(found.sel(run="free")).all()
 
 
+def test_a_measured_force_is_that_of_its_run_or_of_all() -> None:
+    """Of m v' = f - c v behind a step of the force the derivatives of v are closed forms."""
+    cart = ns.System(
+        states=["v"],
+        parameters={"c": 0.5, "m": 2.0},
+        modes={"rolls": lambda t, u, p: ((p.force - p.c * u.v) / p.m,)},
+        inputs=["force"],
+    )
+    t, c, m = np.linspace(0.0, 6.0, 61), 0.5, 2.0
+    rest = np.exp(-c * t / m)
+    unit = np.stack([t / m / c * rest - (1 - rest) / c**2, -t / m**2 * rest], axis=1)
+    run = {"duration": 6.0, "samples": t}
+    found = ns.plan_experiment(
+        cart,
+        {"own": {**run, "inputs": {"force": ([0.0, 6.0], [3.0, 3.0])}}, "shared": run},
+        ["c", "m"],
+        measured={"v": ns.Sensor(noise=0.01)},
+        inputs={"force": ns.Input([0.0, 6.0], [2.0, 2.0], between="steps")},
+        free_start=False,
+    )
+    for k, force in enumerate((3.0, 2.0)):
+        np.testing.assert_allclose(found["information"].values[k], unit.T @ unit * (force / 0.01) ** 2, rtol=1e-9)
+
+
 def test_through_a_stop_information_comes_with_the_impacts() -> None:
     """Before the first impact nothing is told of the restitution; behind each one more."""
     s = ns.mechanical(

@@ -283,7 +283,10 @@ def driven(system: System, given: Any) -> Driven | None:
     found = {}
     for name in system.inputs:
         if name not in table:
-            raise ValueError(f"inputs: {name!r} is missing; {system.name!r} has {', '.join(map(repr, system.inputs))}")
+            raise ValueError(
+                f"inputs: {name!r} is missing; {system.name!r} has {', '.join(map(repr, system.inputs))}: give each as "
+                "(time, values) or ns.Input(...), beside a recording also by the name of a channel"
+            )
         one = table[name]
         if not isinstance(one, Input):
             if not isinstance(one, list | tuple) or len(one) != 2:

@@ -26,7 +26,7 @@ from nonsmooth.system.arguments import check_system, checked
 from nonsmooth.system.kinds import at_least
 from nonsmooth.system.system import System
 
-_OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "settings")
+_OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "inputs", "settings")
 
 
 @checked
@@ -37,6 +37,7 @@ def plan_experiment(
     parameters: Sequence[str],
     *,
     measured: Mapping[str, Any] | Sequence[str] | str,
+    inputs: Any = None,
     **options: Unpack[Prior],
 ) -> xr.Dataset:
     r"""Return the information of candidate runs about parameters, and the order in which to make them.
@@ -62,6 +63,8 @@ def plan_experiment(
         The unknowns, as :func:`nonsmooth.fit` takes them.
     measured : mapping of str to Sensor
         What is measured, each with ``Sensor(noise=...)`` or ``Sensor(resolution=...)``.
+    inputs : mapping of input to (time, values) or Input, optional
+        The courses of the system's inputs, as in :func:`nonsmooth.simulate`; a run may have ``inputs`` of its own.
 
     Returns
     -------
@@ -110,7 +113,8 @@ def plan_experiment(
             raise ValueError(f"measured[{name!r}] says no noise: give ns.Sensor(noise=...) or resolution=")
     for name, run in runs.items():
         check_keys(run, _OF_A_RUN, f"runs[{name!r}]", "a property", "a run")
-    rows = [_information(system, str(name), run, parameters, sensors, noise, options) for name, run in runs.items()]
+    every = {str(name): {"inputs": inputs, **run} for name, run in runs.items()}
+    rows = [_information(system, name, run, parameters, sensors, noise, options) for name, run in every.items()]
     names, _, precision, theta = rows[-1]
     found = [told for _, told, *_ in rows]
     alone = np.array([_uncertainties(one + precision) for one in found])
@@ -166,7 +170,7 @@ def _information(
     motion = simulate(there, **{key: run[key] for key in run if key != "settings"})
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
     given = {"measured": sensors, "priors": known_before["priors"]}
-    problem = problem_of(there, motion, parameters, given, run.get("mode") or mode)
+    problem = problem_of(there, motion, parameters, given, run.get("mode") or mode, inputs=run["inputs"])
     problem = replace(problem, noise=noise)
     theta = problem.unknowns.guess
     begin = motion["u"].values[:1]
@@ -221,6 +225,7 @@ def select_model(
     recording: Any,
     *,
     folds: Annotated[int, at_least(2)] = 5,
+    inputs: Any = None,
     **options: Unpack[Recorded],
 ) -> xr.Dataset:
     r"""Errors with which systems predict parts of a recording that they were not fitted to.
@@ -238,6 +243,8 @@ def select_model(
         See :func:`nonsmooth.fit`; the measured states or outputs are those of every system.
     folds : int
         How many times a part is held out.
+    inputs : mapping of input to channel, Input or (time, values), optional
+        The courses of the systems' inputs, as in :func:`nonsmooth.fit`.
 
     Returns
     -------
@@ -274,7 +281,7 @@ def select_model(
             given = f"{len(pair)} things" if isinstance(pair, list | tuple) else type(pair).__name__
             raise TypeError(f"models[{name!r}] must be a pair (system, parameters), not {given}")
         check_system(pair[0], "select_model", inputs=True)
-        problems[str(name)] = problem_of(pair[0], recording, pair[1], options)
+        problems[str(name)] = problem_of(pair[0], recording, pair[1], options, inputs=inputs)
     held = _held_out(next(iter(problems.values())), folds)
     found = np.empty((len(problems), folds))
     with watched(len(problems) * folds, "models", progress) as advance:
