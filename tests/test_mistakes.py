@@ -890,6 +890,23 @@ def test_an_attribute_that_there_is_not(ask: Callable[..., object], said: str) -
     assert not hasattr(orbit, "data_vars")
 
 
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda orbit: ns.smoothing_report(orbit, [1e-3]), "orbit.system is that of an orbit"),
+        (lambda orbit: ns.simulate(orbit.system, periods=1, start=orbit), r"orbit.trajectory\(\) is one"),
+        (lambda orbit: ns.explore(orbit, browser=False), "explore takes an ns.System"),
+        (lambda orbit: ns.explore("impact_oscillator"), r"called by its name: ns.models.impact_oscillator\(\)"),
+        (lambda orbit: ns.explore(ns.models.impact_oscillator), r"call it: impact_oscillator\(\)"),
+        (lambda orbit: ns.explore(orbit.system, port="a"), "port must be a whole number, not 'a'"),
+        (lambda orbit: ns.explore(orbit.system, port=70000), "port = 70000 must be zero or more and at most 65535"),
+    ],
+)
+def test_what_is_given_in_place_of_a_system(call: Callable[..., object], said: str) -> None:
+    with pytest.raises((TypeError, ValueError), match=said):
+        call(ns.find_orbit(ns.models.discontinuous_support()))
+
+
 def test_answers_can_be_copied_and_sent_to_another_process() -> None:
     orbit = ns.find_orbit(ns.models.discontinuous_support())
     found = ns.ParameterSet({"k": Estimate(1.0, 0.1)}, [[0.01]], notes=["one"], synthetic=True)

@@ -10,24 +10,27 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import parse_qsl
 
 from nonsmooth.errors import not_installed
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
+from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.catalogue import Catalogue
     from nonsmooth.explorer.session import Page
-    from nonsmooth.system.system import System
 
 PORT = 5180
 
 
+@checked
 def explore(
     system: System | None = None,
     *,
     query: str = "",
-    port: int | None = None,
+    port: Annotated[int, at_least(0, 65535)] | None = None,
     browser: bool = True,
     told: Callable[[str], object] | None = None,
 ) -> None:

@@ -178,7 +178,8 @@ def _state(system: System, start: Any) -> FloatArray:
         return _finite(np.array([*(_number(start.get(name, 0.0), name) for name in own), *rest]), names)
     if not _is_list(start):
         raise TypeError(
-            f"start must be a state ({_form(own)}), a result of simulate, or a list of states, not {shortened(start)}"
+            f"start must be a state ({_form(own)}), a result of simulate (orbit.trajectory() is one), or a list of "
+            f"states, not {shortened(start)}"
         )
     values = float_array(start, "the numbers of a start")
     if values.shape != (len(own),):

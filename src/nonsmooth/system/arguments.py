@@ -41,6 +41,8 @@ def check_system(system: Any, verb: str, inputs: bool = False) -> Any:
     hint = f"; call it: {name}()" if callable(system) and name else ""
     if hasattr(system, "data_vars"):
         hint = "; ns.system_of(result) is that of a result"
+    elif isinstance(getattr(system, "system", None), System):
+        hint = "; orbit.system is that of an orbit"
     elif isinstance(system, str):
         hint = f"; a ready model is called by its name: ns.models.{system}()"
     raise TypeError(f"{verb} takes an ns.System, not {shortened(system)}{hint}")
@@ -156,7 +158,8 @@ class _Door:
         found = {name: reader_of(kind) for name, kind in self.kinds.items()}
         if "system" in found:
             driven = "inputs" in self.items or "ax" in self.items  # figures draw them too
-            found["system"] = lambda value, _: check_system(value, self.verb, driven)
+            standard = self.items["system"].default
+            found["system"] = lambda value, _: value if value is standard else check_system(value, self.verb, driven)
         return found
 
     def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], error: str) -> str:
