@@ -340,13 +340,15 @@ def test_the_result_is_saved_and_loaded(tmp_path: Any) -> None:
         ({"bounds": {"cc": (1.0, None)}}, ValueError, "`cc` is not a parameter"),
         ({"first_order": True}, ValueError, "concerns the special points of a branch"),
         ({"verb": lambda s: "words"}, TypeError, "the verb returned str"),
+        ({"found": {"c": (0.87, 0.01)}}, TypeError, r"'c' is given as \(0.87, 0.01\): .* it stands in settings="),
     ],
 )
 def test_what_does_not_fit_is_refused(change: dict[str, Any], error: type[Exception], message: str) -> None:
     s = support()
-    given: dict[str, Any] = {"verb": lambda one: one.values["c"], "start": s, "draws": 3, **QUIET, **change}
+    given: dict[str, Any] = {"found": known(s, {"c": 0.01}), "verb": lambda one: one.values["c"], "start": s}
+    given |= {"draws": 3, **QUIET, **change}
     with pytest.raises(error, match=message):
-        ns.propagate(known(s, {"c": 0.01}), given.pop("verb"), given.pop("start"), **given)
+        ns.propagate(given.pop("found"), given.pop("verb"), given.pop("start"), **given)
 
 
 def test_a_response_without_a_jump_has_bands() -> None:

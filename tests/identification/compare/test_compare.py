@@ -260,6 +260,23 @@ def test_a_rig_and_a_theory_on_either_side_of_a_flip(rig: float, theory: float, 
     assert str(found["period_relation"].values).startswith(words)
 
 
+@pytest.mark.parametrize(
+    ("rig", "theory", "words"),
+    [
+        (0.5, 0.5, "none found in either"),
+        (0.5, 0.02, "found in the predicted motion alone"),
+        (0.02, 0.5, "found in the measured motion alone"),
+    ],
+)
+def test_motions_without_a_period_are_not_of_the_same_one(rig: float, theory: float, words: str) -> None:
+    """The forced mass is chaotic at its stop; with 0.02 it does not reach it."""
+    hammer = ns.models.impact_oscillator(omega=2.6, e=0.9, d=0.1)
+    cloud = ns.poincare(hammer.with_parameters(A=rig), n=60, transient=500).isel(start=0, missing_dims="ignore")
+    measured = cloud[["section"]].assign_coords(state=["x", "v"])
+    found = compare(measured, hammer, settings={"A": theory}, noise=[1e-4, 1e-4])
+    assert str(found["period_relation"].values) == words
+
+
 def test_a_table_of_amplitudes_is_a_response() -> None:
     """As ``fit`` takes it: a mapping, or a DataFrame; of a linear oscillator in closed form."""
     import pandas as pd

@@ -68,8 +68,11 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
 
 def nominal(system: System, parameters: Mapping[str, float] | None, settings: Settings) -> System:
     """The system at the identified parameters and at the run's settings; settings win."""
-    if parameters is not None:
-        system = system.with_parameters(dict(parameters))
+    given = dict(parameters or {})
+    for name, value in given.items():
+        if isinstance(value, tuple | list):
+            raise TypeError(f"{name!r} is given as {value!r}: with an uncertainty it stands in settings=")
+    system = system.with_parameters(given)
     return system.with_parameters(settled(settings, system.values))
 
 

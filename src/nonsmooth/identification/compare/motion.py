@@ -149,7 +149,10 @@ def _periods(
     number: int, predicted: Prediction, section: FloatArray, scale: FloatArray, states: list[str]
 ) -> dict[str, Any]:
     theory = predicted.period_number
-    words = "the same" if number == theory else "others"
+    same = number == theory
+    words = "the same" if same else "others"
+    if not number or not theory:
+        words = "none found in either" if same else f"found in the {'measured' if number else 'predicted'} motion alone"
     rows = [(number, section, "measured"), (theory, predicted.sections[0], "predicted")]
     (low, single, _), (high, doubled, whose) = sorted(rows, key=lambda row: row[0])
     if low > 0 and high == 2 * low and (apart := _doubled(single, doubled, scale, low)) is not None:
