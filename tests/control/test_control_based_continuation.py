@@ -189,6 +189,20 @@ def test_what_is_no_rig_is_told_how_to_become_one():
         ns.control_based_continuation(Bare(None), "frequency", (4.0, 5.0), frequency=4.5, amplitude=0.1)
     with pytest.raises(ValueError, match="nearest: omega"):
         ns.SimulatedRig(model, frequency="omgea")
+    cart = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        coordinates=["x"],
+        parameters={"P": 0.3, "w": 1.0},
+        forcing={"x": lambda t, p: p.P * np.cos(p.w * t)},
+    )
+    options = {"velocity": "v_x", "frequency": "w", "amplitude": "P", "mass": 1.0}
+    assert ns.SimulatedRig(cart, **options).mass == 1.0
+    for option, given in {"velocity": "v", "frequency": "omega", "amplitude": "rho", "mass": "m"}.items():
+        others = {name: one for name, one in options.items() if name != option}
+        with pytest.raises(ValueError, match=f"^{option} = '{given}': .* give {option}= of this system"):
+            ns.SimulatedRig(cart, **others)
     with pytest.raises(ns.SystemDefinitionError, match="no forcing period"):
         ns.SimulatedRig(ns.models.stick_slip_belt(), frequency="v_b", amplitude="F", mass=1.0)
 

@@ -25,13 +25,11 @@ def actuated(system: System, *, velocity: str, mass: str | float) -> System:
 
     Raises
     ------
-    ValueError
-        A state or a parameter that the system has not.
     SystemDefinitionError
         A system without a forcing period, or with a mode that no force could end.
     """
     content = json.loads(system.to_text())
-    _check(system, content, velocity, mass)
+    _check(system, content, velocity)
     content["memory"][FORCE] = {"value": 0.0, "unit": ""}
     rate = f"p.{FORCE}/{f'p.{mass}' if isinstance(mass, str) else repr(float(mass))}"
     for rates in content["modes"].values():
@@ -40,12 +38,8 @@ def actuated(system: System, *, velocity: str, mass: str | float) -> System:
     return type(system).from_text(json.dumps(content))
 
 
-def _check(system: System, content: dict[str, Any], velocity: str, mass: str | float) -> None:
+def _check(system: System, content: dict[str, Any], velocity: str) -> None:
     name = repr(system.name)
-    if velocity not in system.states:
-        raise ValueError(unknown(velocity, "a state", name, system.states))
-    if isinstance(mass, str) and mass not in system.parameters:
-        raise ValueError(unknown(mass, "a parameter", name, {k: one.unit for k, one in system.parameters.items()}))
     if "period" not in content:
         raise SystemDefinitionError(f"{name} has no forcing period, with which the reference of a controller repeats")
     if system.is_smoothed:
@@ -129,12 +123,13 @@ class SimulatedRig:
         from nonsmooth.flow.engines.methods import engine_for
         from nonsmooth.flow.starts import first_state
 
-        if position not in system.states:
-            raise ValueError(unknown(position, "a state", repr(system.name), system.states))
-        for name in (frequency, amplitude):
-            if name not in system.parameters:
-                known = {key: one.unit for key, one in system.parameters.items()}
-                raise ValueError(unknown(name, "a parameter", repr(system.name), known))
+        units = {key: one.unit for key, one in system.parameters.items()}
+        states, knobs = {"position": position, "velocity": velocity}, {"frequency": frequency, "amplitude": amplitude}
+        for some, kind, known in (states, "a state", system.states), (knobs | {"mass": mass}, "a parameter", units):
+            for option, name in some.items():
+                if isinstance(name, str) and name not in known:
+                    said = unknown(name, kind, repr(system.name), known)
+                    raise ValueError(f"{option} = {name!r}: {said}; give {option}= of this system")
         self.names = {"frequency": frequency, "amplitude": amplitude, "position": position, "velocity": velocity}
         self.units = {name: system.parameters[name].unit for name in (frequency, amplitude)} | dict(system.states)
         self.mass = float(system.values[mass]) if isinstance(mass, str) and mass in system.values else mass
