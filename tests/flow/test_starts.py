@@ -62,3 +62,7 @@ def test_the_last_state_of_a_run_is_a_start(system: ns.System) -> None:
         start_states(other, run)
     with pytest.raises(ValueError, match="must be a result of simulate"):
         start_states(system, ns.poincare(system, n=2))
+    with pytest.raises(ValueError, match=r"a state within it is run\['u'\].isel\(time=k\)"):
+        ns.simulate(system, periods=1, start=run.isel(time=5))
+    with pytest.raises(ValueError, match=r"has no `mode`: give it whole, or a state of it, run\['u'\].isel\(time=-1\)"):
+        ns.simulate(system, periods=1, start=run[["u"]])

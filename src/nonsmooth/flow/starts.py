@@ -134,6 +134,10 @@ def first_state(system: System, start: Any, mode: str | None = None) -> State:
     """
     state = State(start_states(system, start)[0].copy(), system.memory_vector())
     if hasattr(start, "data_vars"):
+        if "mode" not in start:
+            raise ValueError(
+                "the result given as start has no `mode`: give it whole, or a state of it, run['u'].isel(time=-1)"
+            )
         ended = start["mode"].attrs["flag_meanings"].split()[int(start["mode"].values[-1])]
         state.counters[0] = mode_number(system, ended) or 0
         for i, name in enumerate(system.memory):
@@ -167,7 +171,7 @@ def _state(system: System, start: Any) -> FloatArray:
             return np.nan_to_num(np.array(start["u"].values[-1], dtype=float), nan=0.0)
         raise ValueError(
             f"a Dataset given as start must be a result of simulate with the states {', '.join(names)} of "
-            f"{system.name!r}"
+            f"{system.name!r}; a state within it is run['u'].isel(time=k)"
         )
     if isinstance(start, Mapping):
         for name in start:

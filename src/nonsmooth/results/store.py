@@ -60,8 +60,9 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """
     if not isinstance(result, xr.Dataset):
         raise TypeError(
-            f"save takes an xarray.Dataset, got {type(result).__name__}: of an orbit or a fit give .to_dataset(); a "
-            "system stands in every result made with it (ns.system_of), or is text, system.to_text()"
+            f"save takes an xarray.Dataset, got {type(result).__name__}: of an orbit or a fit give .to_dataset(), of "
+            "an array or a table the result that it was taken from; a system stands in every result made with it "
+            "(ns.system_of), or is text, system.to_text()"
         )
     target = Path(path)
     try:
