@@ -389,6 +389,26 @@ def test_mistakes_are_answered_with_what_to_do():
         ns.fit(ns.models.chua_circuit(), data, ["phase"])
 
 
+def test_a_start_that_no_reading_shows_is_not_known():
+    """Beside the oscillator stands a state of its own; the readings of x say nothing of it, and those of both do."""
+    system = ns.System(
+        states=["x", "v", "q"],
+        parameters={"k": 9.5, "c": 0.2},
+        modes={"free": lambda t, u, p: (u.v, -p.k * u.x - p.c * u.v, -u.q)},
+    )
+    t, rng, w = np.arange(0, 6, 0.05), np.random.default_rng(0), np.sqrt(9.5 - 0.01)
+    x = np.exp(-0.1 * t) * (np.cos(w * t) + 0.1 / w * np.sin(w * t)) + 1e-3 * rng.standard_normal(t.size)
+    q = np.exp(-t) + 1e-3 * rng.standard_normal(t.size)
+    alone, both = (
+        ns.fit(system, seen, ["k", "c"], progress=False) for seen in ({"x": (t, x)}, {"x": (t, x), "q": (t, q)})
+    )
+    assert np.isinf(alone.estimate("q(0)").uncertainty) and np.isfinite(alone.estimate("v(0)").uncertainty)
+    assert both.estimate("q(0)").value == pytest.approx(1.0, abs=4e-4)
+    assert both.estimate("q(0)").uncertainty == pytest.approx(1e-3 / np.sqrt(np.sum(np.exp(-2 * t))), rel=0.2)
+    for name in ("k", "v(0)"):
+        assert alone.estimate(name).uncertainty == pytest.approx(both.estimate(name).uncertainty, rel=0.1)
+
+
 def test_a_fit_that_nothing_starts_says_so():
     system = duffing()  # every window of this record begins beyond the stop
     t = np.linspace(0, 10, 200)

@@ -63,7 +63,7 @@ def outcome(
     covariance[:s, :s] = jacobian @ of_theta @ jacobian.T
     covariance[m:s, m:s] += own
     covariance[range(s, s + q), range(s, s + q)] = [one.uncertainty**2 for one in noise.values()]
-    lost = np.flatnonzero(~(np.diag(covariance) >= 0.0))  # of a fit that went so wrong that nothing is left of it
+    lost = np.flatnonzero(~(np.diag(covariance) >= 0.0))  # also of a fit that went so wrong that nothing is left
     for i in {*loose, *lost.tolist()}:
         covariance[i] = covariance[:, i] = 0.0
         covariance[i, i] = np.inf
@@ -130,7 +130,7 @@ def _widen(covariance: FloatArray, i: int, profile: Finding) -> None:
 
 def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]], list[FloatArray], FloatArray]:
     """Free starts of the records with their units, how they follow the unknowns, and what their own readings leave
-    open."""
+    open: NaN where it is the spread that holds a start, rather than readings."""
     from scipy.linalg import block_diag
 
     problem, states = grown.problem, list(grown.problem.system.states.items())
@@ -145,7 +145,9 @@ def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]]
         label = f", {problem.records[window.record].name}" if len(problem.records) > 1 else ""
         starts |= {f"{states[k][0]}(0){label}": (grown.starts[i][k], states[k][1]) for k in window.free}
         rows.append(follows[window.free])
-        own.append((inverse @ inverse.T)[np.ix_(window.free, window.free)] * found.reduced)
+        left = (inverse @ inverse.T)[np.ix_(window.free, window.free)]
+        left[np.diag(np.diag(left) > 0.5 * window.spread[window.free] ** 2)] = np.nan
+        own.append(left * found.reduced)
     return starts, rows, block_diag(*own)
 
 
