@@ -171,4 +171,5 @@ def test_coverage(name, kind):
     inside, rms = (np.abs(far) < 1.96).sum(axis=0), float(np.sqrt(np.mean(far**2)))
     alarms = sum(any(MODEL in one for one in found.anomalies) for found, _ in fits)
     print(f"{name}, {kind}: rms {rms:.2f}, inside {inside.tolist()} of 40, {alarms} alarms")
-    assert 0.7 < rms < 1.4 and (inside >= 34).all() and alarms <= 1  # 1 % over all
+    # of seventy-five parameters one lies below 32 by chance in one of a hundred campaigns
+    assert 0.7 < rms < 1.4 and (inside >= 32).all() and alarms <= 1

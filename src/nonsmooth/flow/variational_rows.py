@@ -21,7 +21,8 @@ from nonsmooth.system.codegen.linear import apart, linear_form
 from nonsmooth.system.codegen.variations import VariationalModel
 from nonsmooth.system.derived.deciding import decide
 from nonsmooth.system.derived.instants import RowNumbers
-from nonsmooth.system.derived.patterns import STEP, Patterns, Reset
+from nonsmooth.system.derived.leads import Reset
+from nonsmooth.system.derived.patterns import STEP, Patterns
 from nonsmooth.system.derived.rows import Rows
 
 if TYPE_CHECKING:

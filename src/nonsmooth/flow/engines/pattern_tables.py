@@ -16,13 +16,14 @@ from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.codegen.linear import apart, put_together
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
 from nonsmooth.system.derived.instants import RowNumbers
-from nonsmooth.system.derived.patterns import Lead, Reset
+from nonsmooth.system.derived.leads import Lead, Reset
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, FOUND, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.hybrid.records import Form
     from nonsmooth.system.derived.assembly import Pattern
-    from nonsmooth.system.derived.patterns import Conditions, Patterns
+    from nonsmooth.system.derived.leads import Conditions
+    from nonsmooth.system.derived.patterns import Patterns
 
 MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table

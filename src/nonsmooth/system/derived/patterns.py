@@ -11,7 +11,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -21,6 +21,7 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.codegen.linear import SHAPES
 from nonsmooth.system.derived.assembly import Pattern
 from nonsmooth.system.derived.elements.element import THROWN
+from nonsmooth.system.derived.leads import Conditions, Lead, Out, Reset
 from nonsmooth.system.derived.rows import Row, Rows
 from nonsmooth.system.symbolic.domain import forcing_period
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedCondition, TracedTransition
@@ -28,43 +29,10 @@ from nonsmooth.system.symbolic.tracing import call_scalar
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm
-    from nonsmooth.system.derived.elements.element import Leaving
     from nonsmooth.system.derived.expressions import Expressions
 
 KEPT = 8  # parameter points, and derivatives there, whose numbers are kept by a thread
 STEP = 1e-30  # of the imaginary parts that carry derivatives: its square is nothing
-
-Conditions = tuple[TracedCondition, ...]
-
-
-class Out(NamedTuple):
-    """A way of an element out of its phase, and its conditions by their numbers; ``way``: the first of the same map."""
-
-    element: int
-    way: int
-    leaving: Leaving
-    rows: Conditions
-
-
-class Reset(NamedTuple):
-    """The change of the states by a transition: the ``way``-th way of an element out of its phase, or an impact of
-    several of them (~k: without restitution), with friction or one after the other where it ``rubs``."""
-
-    elements: tuple[int, ...]
-    way: int = -1
-    rubs: bool = False
-
-
-class Lead(NamedTuple):
-    """A transition between patterns: by the conditions of which element (of one in ``ENDS``, the elements for which
-    there is no answer), of what kind, and what it does to the states."""
-
-    source: Pattern
-    target: Pattern
-    element: str
-    rows: Conditions
-    kind: str
-    change: Reset | None = None
 
 
 @dataclass(eq=False)
