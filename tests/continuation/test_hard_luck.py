@@ -58,7 +58,7 @@ def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
     whole = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
     _interrupt_after(5, Curve, monkeypatch)
-    with pytest.raises(ns.Interrupted, match="points that were found are in `result`") as first:
+    with pytest.raises(ns.Interrupted, match=r"continue_orbit\(branch\). Its \d+ points are in `result`") as first:
         ns.continue_orbit(orbit, "omega", (3.0, 3.5))
     monkeypatch.undo()
     assert isinstance(first.value, KeyboardInterrupt)
@@ -79,6 +79,7 @@ def test_a_curve_that_is_interrupted(flip: xr.Dataset, monkeypatch: pytest.Monke
     _interrupt_after(5, Locus, monkeypatch)
     with pytest.raises(ns.Interrupted) as raised:
         ns.continue_curve(flip, {"omega": (3.9, 5.0), "rho": (0.1, 0.2)})
+    assert "continue_orbit" not in str(raised.value)  # which goes on with orbits of one parameter
     curve = raised.value.result
     assert curve.sizes["point"] == 6  # the first, and one for each step
     assert [str(text)[:11] for text in curve["ended_because"].values] == ["Interrupted"] * 2

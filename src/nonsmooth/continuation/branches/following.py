@@ -104,9 +104,10 @@ def dataset(
     result = line(labels, attrs, parameters, tables, record.points, record.special, ends, more)
     if "interrupted" not in record.endings:
         return result
+    said = record.sentences[record.endings.index("interrupted")]
     raise Interrupted(
-        f"interrupted: the {result.sizes['point']} points that were found are in `result` of this exception "
-        "(at a prompt: import sys; branch = sys.last_value.result). continue_orbit(branch) goes on with orbits",
+        f"{said} Its {result.sizes['point']} points are in `result` of this exception (at a prompt: import sys; "
+        "branch = sys.last_value.result)",
         result,
     )
 
