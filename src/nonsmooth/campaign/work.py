@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -149,11 +148,6 @@ def difference(record: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
 def processor_type(device: str) -> str:
     """The type of this machine's processor, or that of its GPU with ``device="cuda"``."""
     return gpu_type() if device == "cuda" else cpu_type()
-
-
-def clock(device: str) -> Callable[[], float]:
-    """Seconds of a processor's thread, which other users of the machine do not lengthen; of a GPU those on the wall."""
-    return time.perf_counter if device == "cuda" else time.thread_time
 
 
 @cache

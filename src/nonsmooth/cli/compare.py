@@ -182,11 +182,10 @@ def _summary(result: xr.Dataset) -> str:
     for name, array in result.data_vars.items():
         small = array.ndim == 0 or (array.ndim == 1 and array.dims[0] in ("jump", "flip", "attractor", "state"))
         if small and name != "section_scale":
-            values = " ".join(_word(value) for value in array.values.ravel()) or "none"
+            values = (
+                " ".join(value if isinstance(value, str) else f"{float(value):.5g}" for value in array.values.ravel())
+                or "none"
+            )
             unit = array.attrs.get("units", "")
             lines.append(f"  {name:<28}{values}{f' {unit}' if unit not in ('', '1') else ''}")
     return "\n".join(lines)
-
-
-def _word(value: Any) -> str:
-    return str(value) if isinstance(value, str) else f"{float(value):.5g}"

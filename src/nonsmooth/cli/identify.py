@@ -72,7 +72,8 @@ def said(found: Any) -> int:
 
 def _read(path: Path) -> dict[str, Any]:
     """Contents of a study file, paths already relative to where the command runs."""
-    from nonsmooth.recordings.session import NOTEBOOK
+    from nonsmooth.cli.study import load_model
+    from nonsmooth.recordings.session import APPARATUS, NOTEBOOK
 
     if path.is_dir():
         if not (path / NOTEBOOK).is_file():
@@ -81,13 +82,7 @@ def _read(path: Path) -> dict[str, Any]:
     if path.name == NOTEBOOK:
         return {"session": path.parent}
     document = read_tables(path, _TABLES, "study file or session folder", {"identify": ("session",)})
-    return _study(path, document["identify"], document.get("output", {}))
-
-
-def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> dict[str, Any]:
-    from nonsmooth.cli.study import load_model
-    from nonsmooth.recordings.session import APPARATUS
-
+    asked, output = document["identify"], document.get("output", {})
     where, folder = f"{path}, table [identify]", path.parent
     session = folder / asked["session"]
     if not session.is_dir():

@@ -12,8 +12,9 @@ A label is the period number with the contacts per cycle, or the status where th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -78,7 +79,7 @@ def refined(
         raise ValueError("refine needs points that stand alone: leave carry out and give one start")
     check_room(work, label)
     columns |= empty_columns(work)
-    return _Refinement(work, share, threads, progress, label, columns).result()
+    return _Refinement(work, share, partial(run, threads=threads, progress=progress, label=label), columns).result()
 
 
 def confidence_of(
@@ -103,12 +104,10 @@ class _Refinement:
         self,
         work: ChartWork,
         share: float,
-        threads: int | None,
-        progress: Progress,
-        label: str,
+        fill: Callable[..., object],
         columns: dict[str, NDArray[Any]],
     ) -> None:
-        self.work, self.threads, self.progress, self.text, self.columns = work, threads, progress, label, columns
+        self.work, self.fill, self.columns = work, fill, columns
         self.shape = (len(next(iter(work.grid.values()))), len(list(work.grid.values())[1]))
         size = self.shape[0] * self.shape[1]
         self.budget = max(int(share * size), min(size, LEAST_POINTS))
@@ -154,7 +153,7 @@ class _Refinement:
         found: dict[str, NDArray[Any]] = {}
         work = replace(self.work, where=places)
         try:
-            run(work, threads=self.threads, progress=self.progress, label=self.text, columns=found)
+            self.fill(work, columns=found)
         finally:
             for name, values in found.items():
                 self.columns[name][places] = values

@@ -238,11 +238,12 @@ class Workshop:
     @property
     def actions(self) -> dict[str, Callable[[str, Any], object]]:
         """Messages of the page that concern the form."""
-
-        def show(name: str, value: Any) -> None:
-            self._write()
-
-        return {"build": self._build, "build form": show, "build add": self._add, "build remove": self._remove}
+        return {
+            "build": self._build,
+            "build form": lambda *_: self._write(),
+            "build add": self._add,
+            "build remove": self._remove,
+        }
 
     def set(self, name: str, value: Any) -> None:
         """Take the text of a field, ``build.omega`` or ``build.masses.0.k``."""

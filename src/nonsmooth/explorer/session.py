@@ -28,7 +28,6 @@ from nonsmooth.explorer.schedule import Schedule, key_of
 from nonsmooth.explorer.sheet import Sheet
 from nonsmooth.explorer.sketch import equations_of
 from nonsmooth.explorer.state import History, PageState, changed
-from nonsmooth.explorer.worker import Answer
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.views.view import View
@@ -157,17 +156,13 @@ class Page:
                 f"{MOST_TABS} tabs of this explorer compute already, each in a process of some 300 MB. Close one of "
                 "them; this one begins with the next change that you make here."
             )
-        elif self.work.begin(self._hear):
+        elif self.work.begin(partial(self.later, self.work.take)):
             self.tabs.append(self)
             self._tell_tabs()
             self.document.add_periodic_callback(self.work.watch, 500)
 
-    def _hear(self, answer: Answer) -> None:
-        """Hand an answer over, from the thread that listens to the worker's pipe."""
-        self.later(self.work.take, answer)
-
     def later(self, act: Callable[..., None], *given: Any) -> None:
-        """Call a function in the thread that the page belongs to, from any other one."""
+        """Call a function in the thread that the page belongs to, from any other one, as that of a worker's pipe."""
         with suppress(AttributeError):  # the tab has been closed, and its document taken apart
             self.document.add_next_tick_callback(partial(act, *given))
 

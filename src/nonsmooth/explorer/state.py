@@ -91,9 +91,9 @@ class PageState:
         given: dict[str, Any] = {field: value}
         return replace(self, **given)
 
-    def with_settings(self, **values: float | str | None) -> PageState:
-        """The same with other settings of views, ``view__setting``; None for the default."""
-        found = {**self.settings, **{name.replace("__", "."): value for name, value in values.items()}}
+    def with_settings(self, values: Mapping[str, float | str | None]) -> PageState:
+        """The same with other settings of views, ``view.setting``; None for the default."""
+        found = {**self.settings, **values}
         return replace(self, settings={name: value for name, value in found.items() if value is not None})
 
 

@@ -107,9 +107,8 @@ def _orbit(job: Job) -> Results:
     system, start, transient = job.system, job["start"], job["transient"]
     judged = _at_one_point(job, start=start, keep=job["keep"])
     shown = periods_shown(int(judged["period_number"].values[0]))
-    if job.forced:
-        span: dict[str, Any] = {"periods": shown, "transient": transient}
-    else:
+    span = job.span(shown, 0.0, 0.0)
+    if not job.forced:
         times = ns.poincare(
             system, section=job.section(), n=shown + 1, transient=transient, start=start, **job.options
         )["time"].values

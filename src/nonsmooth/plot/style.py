@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from colorsys import hls_to_rgb
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
@@ -94,8 +94,7 @@ def _settings(name: str = "journal") -> Any:
     return mpl.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
 
 
-@contextmanager
-def journal() -> Iterator[None]:
+def journal() -> AbstractContextManager[None]:
     """The package's style, for the figures made inside the ``with`` block.
 
     ``plt.style.use("nonsmooth.plot.journal")`` sets it for all figures that follow.
@@ -107,12 +106,10 @@ def journal() -> Iterator[None]:
     >>> with ns.plot.journal():
     ...     figure, ax = plt.subplots()
     """
-    with _in("journal"):
-        yield
+    return _in("journal")
 
 
-@contextmanager
-def slides() -> Iterator[None]:
+def slides() -> AbstractContextManager[None]:
     """A style for slides, for the figures made inside the ``with`` block: wide, large letters, strong lines.
 
     ``plt.style.use("nonsmooth.plot.slides")`` sets it for figures of your own that follow.
@@ -124,8 +121,7 @@ def slides() -> Iterator[None]:
     >>> with ns.plot.slides():
     ...     ax = ns.plot.time_history(run)
     """
-    with _in("slides"):
-        yield
+    return _in("slides")
 
 
 @contextmanager
@@ -161,6 +157,7 @@ def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iter
     TypeError
         Something else was given, such as the name of a quantity.
     """
+    import matplotlib as mpl
     from matplotlib.axes import Axes as Drawable
 
     if ax is not None and not isinstance(ax, Drawable):
@@ -168,8 +165,11 @@ def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iter
             "one of several is ax[0]" if isinstance(ax, np.ndarray) else "what to draw is given by name, as in show=..."
         )
         raise TypeError(f"ax = {shortened(ax)} is no matplotlib Axes: {hint}")
-    if ax is not None:
-        with _own_legend(ax):
+    if ax is not None:  # what the caller has set stays
+        now: Any = mpl.rcParams
+        plain: Any = mpl.rcParamsDefault
+        wanted = {"legend.frameon": _settings()["legend.frameon"], "legend.fontsize": small(ax)}
+        with _set({key: value for key, value in wanted.items() if now[key] == plain[key]}):
             yield ax
         return
     import matplotlib.pyplot as plt
@@ -185,19 +185,6 @@ def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iter
         except BaseException:  # what could not be drawn leaves no empty figure
             plt.close(figure)
             raise
-
-
-@contextmanager
-def _own_legend(ax: Axes) -> Iterator[None]:
-    """Legends in the package's style on a caller's axes; what the caller has set stays."""
-    import matplotlib as mpl
-
-    wanted: Any = {"legend.frameon": _settings()["legend.frameon"], "legend.fontsize": small(ax)}
-    now: Any = mpl.rcParams
-    plain: Any = mpl.rcParamsDefault
-    free: Any = {key: value for key, value in wanted.items() if now[key] == plain[key]}
-    with _set(free):
-        yield
 
 
 def small(ax: Axes) -> float:

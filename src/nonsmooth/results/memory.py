@@ -64,7 +64,7 @@ def room_for(n_bytes: float, what: str, remedy: str) -> None:
 
 _DEFLATED = 1032  # bytes that a byte of deflated data stands for, at most
 _COMPRESSED = 65536  # the same for the codecs of Zarr, whose best blocks hold 128 KiB of equal bytes in a few
-_NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable."
+_NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 _CODECS = {"blosc", "zstd", "zlib", "gzip", "lz4", "lzma", "bz2"}
 
 
@@ -84,7 +84,7 @@ def of_netcdf(source: Path) -> int:
             if not isinstance(opened.get(name, getlink=True), h5py.HardLink):
                 raise DataFileError(f"{source}: {name!r} is a link, which is not followed")
             item = opened[name]
-            if not isinstance(item, h5py.Dataset) or _NO_VARIABLE in _bytes(item.attrs.get("NAME", b"")):
+            if not isinstance(item, h5py.Dataset) or _NO_VARIABLE in str(item.attrs.get("NAME")):
                 continue
             if item.external or item.is_virtual:
                 raise DataFileError(f"{source}: the data of {name!r} lie in another file, which is not read")
@@ -140,7 +140,3 @@ def _codecs(array: Any) -> list[str]:
         return [str(step["id"]) for step in steps if step]
     steps = [step for step in described["codecs"] if step["name"] not in ("bytes", "crc32c")]
     return [str(step["name"]) for step in steps]
-
-
-def _bytes(name: Any) -> bytes:
-    return name if isinstance(name, bytes) else str(name).encode()

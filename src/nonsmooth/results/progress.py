@@ -38,7 +38,16 @@ def progress(total: int, label: str, enabled: Progress = True, done: int = 0) ->
         )
     lock = threading.Lock()
     if callable(enabled) and total > 0:
-        yield _Told(enabled, total, done, lock)
+
+        def tell(n: int = 1) -> None:
+            nonlocal done
+            with lock:
+                done += n
+                if enabled(min(done / total, 1.0)) is False:
+                    raise KeyboardInterrupt("cancelled by the function given as progress")
+
+        tell(0)
+        yield tell
         return
     if not enabled or total <= 0 or not is_watched():
         yield _nothing
@@ -58,20 +67,6 @@ def progress(total: int, label: str, enabled: Progress = True, done: int = 0) ->
                 bar.update(n)
 
         yield advance
-
-
-class _Told:
-    """Tells a function how far the work is."""
-
-    def __init__(self, hear: Callable[[float], object], total: int, done: int, lock: threading.Lock) -> None:
-        self.hear, self.total, self.done, self.lock = hear, total, done, lock
-        self(0)
-
-    def __call__(self, n: int = 1) -> None:
-        with self.lock:
-            self.done += n
-            if self.hear(min(self.done / self.total, 1.0)) is False:
-                raise KeyboardInterrupt("cancelled by the function given as progress")
 
 
 def say(text: str, enabled: Progress = True) -> None:

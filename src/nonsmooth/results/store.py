@@ -279,12 +279,12 @@ def _encode(result: xr.Dataset) -> xr.Dataset:
 
 
 def _netcdf_encoding(result: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
-    encoding: dict[Hashable, dict[str, Any]] = {}
-    for name, variable in result.variables.items():
-        if variable.dtype.kind in "fiu":
-            compress = {"zlib": True, "complevel": 4} if variable.size >= _COMPRESS_FROM else {}
-            encoding[name] = {"_FillValue": None, **compress}
-    return encoding
+    packed: dict[str, Any] = {"zlib": True, "complevel": 4}
+    return {
+        name: {"_FillValue": None, **(packed if variable.size >= _COMPRESS_FROM else {})}
+        for name, variable in result.variables.items()
+        if variable.dtype.kind in "fiu"
+    }
 
 
 def _decoded(raw: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:

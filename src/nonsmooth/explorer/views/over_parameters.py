@@ -390,4 +390,4 @@ class Response(View):
 
     def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the range that is seen."""
-        return self.state.with_settings(response__low=x[0], response__high=x[1])
+        return self.state.with_settings({"response.low": x[0], "response.high": x[1]})

@@ -150,7 +150,7 @@ class Chart(CellImage):
 
     def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the range that is seen; the diagram's range is the same."""
-        return replace(self.state, low=x[0], high=x[1]).with_settings(chart__low=y[0], chart__high=y[1])
+        return replace(self.state, low=x[0], high=x[1]).with_settings({"chart.low": y[0], "chart.high": y[1]})
 
 
 _NEAR = 0.1  # of the window: attractors of two pictures that are this near are one
@@ -247,5 +247,5 @@ class Basins(CellImage):
     def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the window that is seen."""
         return self.state.with_settings(
-            **{f"basins__{end}": value for end, value in zip(self.ends, (*x, *y), strict=True)}
+            {f"basins.{end}": value for end, value in zip(self.ends, (*x, *y), strict=True)}
         )

@@ -145,4 +145,4 @@ class View:
 
     def unzoomed(self) -> PageState:
         """The state after the zoom was reset: the first window."""
-        return self.state.with_settings(**{f"{self.name}__{end}": None for end in self.ends})
+        return self.state.with_settings({f"{self.name}.{end}": None for end in self.ends})

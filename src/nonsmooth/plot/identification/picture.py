@@ -43,15 +43,6 @@ def number(data: xr.Dataset, name: str) -> float:
     return float(data[name].values.flat[0]) if name in data.variables else float("nan")
 
 
-def with_error(value: float, error: float, unit: str = "") -> str:
-    """``8.470 ± 0.012 N/m``: two digits of the error; without a finite one, four digits of the value."""
-    tail = f" {unit}" if unit else ""
-    if not (np.isfinite(error) and error > 0):
-        return f"{value:.4g}{tail}"
-    digits = max(0, 1 - int(np.floor(np.log10(error))))
-    return f"{value:.{digits}f} ± {error:.{digits}f}{tail}"
-
-
 def picture(
     needed: str,
     x: tuple[str, str] | str = ("", ""),
@@ -115,9 +106,17 @@ class Picture:
         return [self.data[name].values for name in names]
 
     def text(self, name: str, unit: str = "", scale: float = 1.0, before: str = "") -> str:
-        """A number of the data with its error, behind some words; nothing where it is not there."""
+        """A number of the data behind some words, ``8.470 ± 0.012 N/m``; nothing where it is not there.
+
+        Two digits of the error stand there; without a finite one, four digits of the value."""
         value, error = (scale * number(self.data, key) for key in (name, f"{name}_error"))
-        return before + with_error(value, error, unit) if np.isfinite(value) else ""
+        tail = f" {unit}" if unit else ""
+        if not np.isfinite(value):
+            return ""
+        if not (np.isfinite(error) and error > 0):
+            return f"{before}{value:.4g}{tail}"
+        digits = max(0, 1 - int(np.floor(np.log10(error))))
+        return f"{before}{value:.{digits}f} ± {error:.{digits}f}{tail}"
 
     def points(self, x: str, y: str, label: str = "", *, where: Any = True, scale: float = 1.0, **looks: Any) -> None:
         """Measured points of two variables, with the error of the second where the data have one."""
