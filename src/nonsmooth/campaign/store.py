@@ -73,11 +73,7 @@ class ChunkStore:
     def write(self, work: ChunkedWork, chunk: int, arrays: Columns, seconds: float) -> None:
         """Keep a chunk: its arrays first, then the mark that it is done.
 
-        Raises
-        ------
-        DataFileError
-            The disk is full, or may not be written; what was there before is whole.
-        """
+        DataFileError: the disk is full, or may not be written; what was there before is whole."""
         first, last = work.bounds(chunk)
         with told(self.path, KEPT):
             group = _results(self.path, "r+")
@@ -186,11 +182,7 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
 
     ``content``: once all chunks are there, the hash of their hashes; else None.
 
-    Raises
-    ------
-    DataFileError
-        Not a store of chunks, or its description was altered.
-    """
+    DataFileError: not a store of chunks, or its description was altered."""
     target = Path(path)
     needs_zarr(target)
     import zarr

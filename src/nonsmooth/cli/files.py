@@ -91,11 +91,7 @@ def put_text(path: Path, text: str) -> Path:
 def keep(result: xr.Dataset, path: Path) -> Path:
     """Save a result; where that fails, elsewhere.
 
-    Raises
-    ------
-    DataFileError
-        It is not where it was asked for; the message says why, and where it is.
-    """
+    DataFileError: it is not where it was asked for; the message says why, and where it is."""
     from nonsmooth.errors import DataFileError
     from nonsmooth.results.store import save
 

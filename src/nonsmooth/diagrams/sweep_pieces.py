@@ -28,13 +28,7 @@ MARGIN = 0.05  # of the range found, added on either side
 
 
 def given_ranges(system: System, density: Any) -> dict[str, tuple[float, float]]:
-    """The ranges named by ``density``; True: none.
-
-    Raises
-    ------
-    ValueError
-        A name that is no state.
-    """
+    """The ranges named by ``density``; True: none. ValueError: a name that is no state."""
     if density is True:
         return {}
     for name in density:
@@ -54,11 +48,7 @@ def bin_edges(
 ) -> FloatArray:
     """Edges (n, bins + 1): of the ranges given, for other states of the section points (..., n) of a coarse run.
 
-    Raises
-    ------
-    ValueError
-        No run of the coarse one came to its end.
-    """
+    ValueError: no run of the coarse one came to its end."""
     edges = np.zeros((len(system.states), bins + 1))
     for j, name in enumerate(system.states):
         if name in ranges:

@@ -170,11 +170,7 @@ class MassChain:
 def read_plan(form: Mapping[str, Any]) -> MassChain:
     """The plan of a form: texts of ``masses``, ``elements`` and ``omega``.
 
-    Raises
-    ------
-    ValueError
-        Whatever is no number within its limits; the message names the row.
-    """
+    ValueError: whatever is no number within its limits; the message names the row."""
     links = tuple(_numbers(LINK, row, f"mass {i}") for i, row in enumerate(form["masses"], 1))
     elements = []
     for i, row in enumerate(form["elements"], 1):

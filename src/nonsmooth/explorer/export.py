@@ -57,11 +57,7 @@ def opened_study(system: System, options: Mapping[str, Any], output: Mapping[str
 def opened_result(result: xr.Dataset) -> tuple[System | None, str]:
     """The system of a result and the query of its view; no system where it is one of ``nonsmooth.models``.
 
-    Raises
-    ------
-    ValueError
-        A Dataset that was not made from a system.
-    """
+    ValueError: a Dataset that was not made from a system."""
     from nonsmooth.results.provenance import read_provenance
     from nonsmooth.system.origin import system_of
 
@@ -111,11 +107,7 @@ KINDS = {
 def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tuple[str, bytes]:
     """The name and the bytes of a file.
 
-    Raises
-    ------
-    ValueError
-        A view that is not computed yet, a kind that does not exist or that the view has not.
-    """
+    ValueError: a view that is not computed yet, a kind that does not exist or that the view has not."""
     known = {name: one for name, one in VIEWS.items() if one.saved is not None}
     if view not in known or kind not in KINDS:
         raise ValueError(f"{view!r} cannot be saved as {kind!r}; views: {', '.join(known)}; kinds: {', '.join(KINDS)}")

@@ -96,11 +96,7 @@ class Setup:
     def changed(self, name: str, value: Any) -> Setup:
         """The same with another value of a field: ``run``, ``turns``, ``begin``, ``end``, ``channel.STATE``, ....
 
-        Raises
-        ------
-        ValueError
-            A field, a state or a channel that does not exist, and text that is no number.
-        """
+        ValueError: a field, a state or a channel that does not exist, and text that is no number."""
         if name == "run":
             return matched(self.recorded, self.system, _known(value, self.recorded.runs, "run"))
         if name in ("begin", "end"):

@@ -116,11 +116,7 @@ def to_query(state: PageState) -> str:
 def from_query(query: str | Sequence[tuple[str, str]], default: PageState, states: Sequence[str]) -> PageState:
     """The state that a query describes; what it leaves out is that of ``default``, a state of the same model.
 
-    Raises
-    ------
-    ValueError
-        Names that the model does not have, and text that is no number.
-    """
+    ValueError: names that the model does not have, and text that is no number."""
     pairs = parse_qsl(query) if isinstance(query, str) else query
     for name, text in pairs:
         default = changed(default, name, text, states)
@@ -130,11 +126,7 @@ def from_query(query: str | Sequence[tuple[str, str]], default: PageState, state
 def changed(state: PageState, name: str, value: Any, states: Sequence[str]) -> PageState:
     """The state after one field, or a parameter ``p.NAME``, has been given a value in text or as a number.
 
-    Raises
-    ------
-    ValueError
-        A field, a parameter or a value that does not exist; the message says what is allowed.
-    """
+    ValueError: a field, a parameter or a value that does not exist; the message says what is allowed."""
     if name == "model":
         return state
     if name.startswith("p."):
@@ -169,13 +161,7 @@ def within(name: str, value: int) -> int:
 
 
 def number_of(value: Any, name: str) -> float:
-    """A finite number from what a browser sent.
-
-    Raises
-    ------
-    ValueError
-        Anything else.
-    """
+    """A finite number from what a browser sent. ValueError: anything else."""
     text = isinstance(value, str)
     try:
         number = math.nan if isinstance(value, bool) or (text and not _NUMBER.fullmatch(value)) else float(value)

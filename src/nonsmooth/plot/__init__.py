@@ -84,7 +84,6 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     from nonsmooth.errors import unknown
-    from nonsmooth.plot import identification
 
     there = not name.startswith("_") and hasattr(identification, name)
     hint = f"; there is ns.plot.identification.{name}" if there else ""

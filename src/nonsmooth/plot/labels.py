@@ -82,11 +82,7 @@ def symbol_of(name: str, symbol: str = "") -> str:
 def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
     """The state ``name`` of ``variable`` (``u``, ``section``, ``maximum``, ...), or the output of that name.
 
-    Raises
-    ------
-    ValueError
-        If ``name`` is neither; the message lists what there is.
-    """
+    ValueError: if ``name`` is neither; the message lists what there is."""
     states = result["state"].values.tolist() if "state" in result.coords else []
     if name in states:
         return result[variable].isel(state=states.index(name))
@@ -135,11 +131,7 @@ def one_of(array: Any, dim: str, at: int, name: str) -> Any:
 def first_states(result: Any, *names: str | None) -> list[str]:
     """The names given, and for those left None the states in their order.
 
-    Raises
-    ------
-    ValueError
-        If the system has fewer states than needed.
-    """
+    ValueError: if the system has fewer states than needed."""
     states = _states(result)
     if len(states) < len(names):
         raise ValueError(f"this plot needs {len(names)} states; the system has {states}")
@@ -149,11 +141,7 @@ def first_states(result: Any, *names: str | None) -> list[str]:
 def only_states(result: Any, *names: str | None) -> list[str]:
     """The same for a result that holds nothing but states, or for a system.
 
-    Raises
-    ------
-    ValueError
-        If the system has fewer states than needed, or none of that name.
-    """
+    ValueError: if the system has fewer states than needed, or none of that name."""
     found, states = first_states(result, *names), _states(result)
     for name in found:
         if name not in states:

@@ -152,11 +152,7 @@ def _set(settings: Any) -> Iterator[None]:
 def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iterator[Axes]:
     """The axes to draw on: the given ones (legends in the package's style), or a new figure of one column.
 
-    Raises
-    ------
-    TypeError
-        Something else was given, such as the name of a quantity.
-    """
+    TypeError: something else was given, such as the name of a quantity."""
     import matplotlib as mpl
     from matplotlib.axes import Axes as Drawable
 

@@ -55,11 +55,7 @@ def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) ->
 def in_unit(axis: Axis, unit: str) -> None:
     """Write an axis that :func:`name_axis` has named in a unit with another prefix, or with none.
 
-    Raises
-    ------
-    ValueError
-        An axis whose unit takes no prefix, or a unit that is not its own with one of them.
-    """
+    ValueError: an axis whose unit takes no prefix, or a unit that is not its own with one of them."""
     ticks = axis.major
     if not isinstance(ticks, _Ticks) or (plain := ticks.units.get(axis)) is None:
         raise ValueError(f"unit = {unit!r}: this axis ({axis.get_label_text()!r}) has no unit that takes a prefix")

@@ -71,11 +71,7 @@ _CODECS = {"blosc", "zstd", "zlib", "gzip", "lz4", "lzma", "bz2"}
 def of_netcdf(source: Path) -> int:
     """Bytes of all variables of a NetCDF (HDF5) file in memory.
 
-    Raises
-    ------
-    DataFileError
-        A variable that is larger than what the file holds of it, or lies outside the file.
-    """
+    DataFileError: a variable that is larger than what the file holds of it, or lies outside the file."""
     import h5py
 
     total = 0

@@ -115,11 +115,7 @@ def read_provenance(result: xr.Dataset) -> dict[str, Any]:
     was computed with (a part was selected, its order changed), the option stays the reference
     ``{"coordinate": name, "sha256": ...}``.
 
-    Raises
-    ------
-    ValueError
-        The Dataset carries no record, or one that cannot be read.
-    """
+    ValueError: the Dataset carries no record, or one that cannot be read."""
     text = result.attrs.get(ATTRIBUTE)
     if not isinstance(text, str):
         raise ValueError(

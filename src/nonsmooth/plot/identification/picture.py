@@ -24,11 +24,7 @@ _SHARE = 0.30  # of the height of the axes, for residuals
 def data_of(finding: Any, *needed: str) -> xr.Dataset:
     """The Dataset of a ``Finding``, or the Dataset itself, with the variables that a picture needs.
 
-    Raises
-    ------
-    ValueError
-        No data, or a variable that is missing: this is the picture of another procedure.
-    """
+    ValueError: no data, or a variable that is missing: this is the picture of another procedure."""
     data: Any = finding if hasattr(finding, "data_vars") else getattr(finding, "data", None)
     if data is None:
         raise ValueError("this finding kept no data to draw")
