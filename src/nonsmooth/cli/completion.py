@@ -4,38 +4,21 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 _NAME = "nonsmooth"
 
 
-@dataclass(frozen=True)
-class _Argument:
-    """An option (or a positional argument, without ``flags``) and the words it takes; None: names of files."""
-
-    flags: tuple[str, ...]
-    text: str
-    takes_value: bool
-    values: tuple[str, ...] | None = None
-
-
-@dataclass(frozen=True)
-class _Command:
+class _Command(NamedTuple):
     name: str
     text: str
-    arguments: tuple[_Argument, ...]
-
-    @property
-    def flags(self) -> str:
-        """All options."""
-        return " ".join(flag for item in self.arguments for flag in item.flags)
+    arguments: list[argparse.Action]
 
     @property
     def words(self) -> str:
         """Words that the positional arguments take; a model or a study file may also be the name of a file."""
-        return " ".join(word for item in self.arguments if not item.flags for word in item.values or ())
+        return " ".join(word for item in self.arguments if not item.option_strings for word in _values(item) or ())
 
 
 def add(commands: Any) -> Any:
@@ -64,21 +47,26 @@ def completion(parser: argparse.ArgumentParser, shell: str) -> str:
     """Return the script for a shell, made from the parser's commands and options."""
     (commands,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
     texts = {action.dest: action.help or "" for action in commands._choices_actions}
-    known = [_Command(name, texts[name], tuple(_arguments(item))) for name, item in commands.choices.items()]
-    top = [item for item in _arguments(parser) if item.flags]
+    known = [_Command(name, texts[name], _arguments(item)) for name, item in commands.choices.items()]
+    top = [item for item in _arguments(parser) if item.option_strings]
     return _SCRIPTS[shell](known, top)
 
 
-def _arguments(parser: argparse.ArgumentParser) -> Iterator[_Argument]:
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            continue
-        text = (action.help or "").split(" (")[0].split(";")[0].replace("`", "")
-        yield _Argument(tuple(action.option_strings), text, action.nargs != 0, _values(action))
+def _arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    return [action for action in parser._actions if not isinstance(action, argparse._SubParsersAction)]
+
+
+def _flags(items: list[argparse.Action]) -> str:
+    return " ".join(flag for item in items for flag in item.option_strings)
+
+
+def _text(action: argparse.Action) -> str:
+    """The first words of its help."""
+    return (action.help or "").split(" (")[0].split(";")[0].replace("`", "")
 
 
 def _values(action: argparse.Action) -> tuple[str, ...] | None:
-    """Words that an argument takes, where they are known."""
+    """Words that an argument takes; None: names of files."""
     from nonsmooth import models
     from nonsmooth.studies import installed
 
@@ -91,7 +79,7 @@ def _values(action: argparse.Action) -> tuple[str, ...] | None:
     return None
 
 
-def _bash(commands: list[_Command], top: list[_Argument]) -> str:
+def _bash(commands: list[_Command], top: list[argparse.Action]) -> str:
     lines = [
         f"# Completion of {_NAME} in bash.",
         f"_{_NAME}() {{",
@@ -104,16 +92,16 @@ def _bash(commands: list[_Command], top: list[_Argument]) -> str:
         "    done",
         '    case "$command" in',
         f'        "") words="{" ".join(command.name for command in commands)}"',
-        f'            flags="{" ".join(flag for item in top for flag in item.flags)}" ;;',
-        *(f'        {one.name}) words="{one.words}"; flags="{one.flags}" ;;' for one in commands),
+        f'            flags="{_flags(top)}" ;;',
+        *(f'        {one.name}) words="{one.words}"; flags="{_flags(one.arguments)}" ;;' for one in commands),
         "    esac",
         '    case "$command $previous" in',
     ]
     for command in commands:
         for item in command.arguments:
-            if item.flags and item.takes_value:
-                given = "|".join(f'"{command.name} {flag}"' for flag in item.flags)
-                lines.append(f'        {given}) words="{" ".join(item.values or ())}" ;;')
+            if item.option_strings and item.nargs != 0:
+                given = "|".join(f'"{command.name} {flag}"' for flag in item.option_strings)
+                lines.append(f'        {given}) words="{" ".join(_values(item) or ())}" ;;')
     lines += [
         "    esac",
         '    if [[ "$word" == -* ]]; then words="$flags"; fi',
@@ -125,18 +113,19 @@ def _bash(commands: list[_Command], top: list[_Argument]) -> str:
     return "\n".join(lines)
 
 
-def _zsh(commands: list[_Command], top: list[_Argument]) -> str:
+def _zsh(commands: list[_Command], top: list[argparse.Action]) -> str:
     def marked(text: str) -> str:
         return "".join(f"\\{letter}" if letter in "[]:\\" else letter for letter in text)
 
-    def specification(item: _Argument) -> list[str]:
-        values = "_files" if item.values is None else f"({' '.join(item.values)})"
-        if not item.flags:
-            return [shlex.quote(f":{marked(item.text) or 'argument'}:{values}")]
-        value = f":value:{values}" if item.takes_value else ""
-        return [shlex.quote(f"{flag}[{marked(item.text)}]{value}") for flag in item.flags]
+    def specification(item: argparse.Action) -> list[str]:
+        known = _values(item)
+        values = "_files" if known is None else f"({' '.join(known)})"
+        if not item.option_strings:
+            return [shlex.quote(f":{marked(_text(item)) or 'argument'}:{values}")]
+        value = f":value:{values}" if item.nargs != 0 else ""
+        return [shlex.quote(f"{flag}[{marked(_text(item))}]{value}") for flag in item.option_strings]
 
-    def arguments(items: tuple[_Argument, ...] | list[_Argument]) -> str:
+    def arguments(items: list[argparse.Action]) -> str:
         return " \\\n            ".join(part for item in items for part in specification(item))
 
     lines = [
@@ -166,17 +155,17 @@ def _zsh(commands: list[_Command], top: list[_Argument]) -> str:
     return "\n".join(lines)
 
 
-def _fish(commands: list[_Command], top: list[_Argument]) -> str:
-    def line(condition: str, item: _Argument) -> str:
+def _fish(commands: list[_Command], top: list[argparse.Action]) -> str:
+    def line(condition: str, item: argparse.Action) -> str:
         parts = ["complete", "-c", _NAME, "-n", condition]
-        for flag in item.flags:
+        for flag in item.option_strings:
             parts += ["-l", flag[2:]] if flag.startswith("--") else ["-s", flag[1:]]
-        if item.values is not None:
-            parts += ["-a", " ".join(item.values)]
-        if item.flags and item.takes_value:
+        if (values := _values(item)) is not None:
+            parts += ["-a", " ".join(values)]
+        if item.option_strings and item.nargs != 0:
             parts.append("-r")
-        if item.text:
-            parts += ["-d", item.text]
+        if _text(item):
+            parts += ["-d", _text(item)]
         return " ".join(map(shlex.quote, parts))
 
     lines = [f"# Completion of {_NAME} in fish."]
@@ -185,8 +174,12 @@ def _fish(commands: list[_Command], top: list[_Argument]) -> str:
         named = ["complete", "-c", _NAME, "-f", "-n", "__fish_use_subcommand", "-a", command.name, "-d", command.text]
         lines.append(" ".join(map(shlex.quote, named)))
         here = f"__fish_seen_subcommand_from {command.name}"
-        lines += [line(here, item) for item in command.arguments if item.flags or item.values]
+        lines += [line(here, item) for item in command.arguments if item.option_strings or _values(item)]
     return "\n".join(lines)
 
 
-_SCRIPTS: dict[str, Callable[[list[_Command], list[_Argument]], str]] = {"bash": _bash, "fish": _fish, "zsh": _zsh}
+_SCRIPTS: dict[str, Callable[[list[_Command], list[argparse.Action]], str]] = {
+    "bash": _bash,
+    "fish": _fish,
+    "zsh": _zsh,
+}

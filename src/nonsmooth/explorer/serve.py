@@ -8,7 +8,6 @@ import sys
 import webbrowser
 from collections.abc import Callable
 from contextlib import nullcontext
-from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import parse_qsl
@@ -19,7 +18,6 @@ from nonsmooth.system.kinds import at_least
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
-    from nonsmooth.explorer.catalogue import Catalogue
     from nonsmooth.explorer.session import Page
 
 PORT = 5180
@@ -73,11 +71,17 @@ def explore(
     catalogue = Catalogue.of(system)
     catalogue.state_of(parse_qsl(query))  # a query that does not fit is refused before anything is served
     access, number = Access(), _free(port)
-    application = Application(FunctionHandler(partial(_open, catalogue, query, [])))
+    tabs: list[Page] = []
+
+    def opened(document: Any) -> None:
+        from nonsmooth.explorer.session import Page
+
+        Page(document, catalogue.copy(), query, tabs)
+
     # No pings: on one machine nothing closes a silent socket, and one that fails takes the session from a connection
     # whose last messages Bokeh has still to read.
     server: Any = Server(
-        application,
+        Application(FunctionHandler(opened)),
         port=number,
         address="127.0.0.1",
         auth_provider=access,
@@ -112,12 +116,6 @@ def _load() -> None:
     """Load what pages need while the browser starts. None of it is looked through again as a page is closed."""
     import_module("nonsmooth.explorer.session")
     gc.freeze()
-
-
-def _open(catalogue: Catalogue, query: str, tabs: list[Page], document: Any) -> None:
-    from nonsmooth.explorer.session import Page
-
-    Page(document, catalogue.copy(), query, tabs)
 
 
 def _free(port: int | None) -> int:
