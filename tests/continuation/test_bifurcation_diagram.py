@@ -61,7 +61,9 @@ def diagram_of(figure: str) -> xr.Dataset:
     return ns.bifurcation_diagram(support(**parameters), name, limits, progress=False)
 
 
-@pytest.mark.parametrize("figure", ["9", pytest.param("10", marks=pytest.mark.slow), "11", "13", "17"])
+@pytest.mark.parametrize(
+    "figure", ["9", "13", *(pytest.param(one, marks=pytest.mark.slow) for one in ("10", "11", "17"))]
+)
 def test_figures_of_the_paper(figure: str) -> None:
     parameters, name, limits, kinds, values = FIGURES[figure]
     diagram = diagram_of(figure)

