@@ -293,13 +293,13 @@ def test_hidden_states_are_found_from_a_guess_far_off(name, seed, tmp_path):
 @pytest.mark.parametrize("name", ["impact oscillator", "bilinear oscillator"])
 def test_intervals_cover_the_truth_of_another_program(name):
     case, far = CASES[name], []
-    for seed in range(3):
+    for seed in range(2):
         data, measured, _ = case.recording(seed)
         found = ns.fit(case.guess(seed), data, case.find, measured=measured)
         assert not found.anomalies
         far.append(normalized(found, {one: case.truth[one] for one in case.find}))
     assert np.max(np.abs(far)) < 4.0
-    assert 0.4 < np.sqrt(np.mean(np.square(far))) < 1.7  # of twelve: 0.6 to 1.4 in 95 of 100
+    assert 0.4 < np.sqrt(np.mean(np.square(far))) < 1.7  # of eight: 0.5 to 1.5 in 95 of 100
 
 
 def test_a_chaotic_record_is_fitted_over_windows_from_one_voltage():

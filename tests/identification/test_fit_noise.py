@@ -21,7 +21,7 @@ def relay(seed, change=lambda t, y, size, rng: y + size * rng.standard_normal(le
     return noise_cases.off(system, truth, find, rng), find, t, change(t, clean, 0.01 * clean.std(), rng)
 
 
-@pytest.mark.parametrize("rho", [0.5, 0.9])
+@pytest.mark.parametrize("rho", [pytest.param(0.5, marks=pytest.mark.slow), 0.9])
 def test_coloured_noise_is_no_failure_of_the_model(rho):
     system, find, t, y = relay(2, lambda t, y, size, rng: y + size * autoregressive(len(t), rho, rng))
     found = ns.fit(system, {"x": (t, y)}, find, progress=False)

@@ -62,8 +62,7 @@ def test_a_state_that_fires(off: float) -> None:
     assert found.extra["v.noise"].value == pytest.approx(0.01, rel=0.15)
 
 
-@pytest.mark.parametrize("noise", [1e-6, 0.02])
-@pytest.mark.parametrize("off", [0.0, 0.04])
+@pytest.mark.parametrize(("noise", "off"), [(1e-6, 0.0), (0.02, 0.04)])
 def test_a_measured_speed_that_an_impact_turns(noise: float, off: float) -> None:
     """Impacts 0.9 s apart and less, 0.02 s between readings, and none of them at an impact."""
     t = np.arange(0.0, 4.0, 0.02)

@@ -74,12 +74,12 @@ def test_a_long_decay_has_the_variance_of_the_books() -> None:
 
 
 def test_fits_of_drawn_records_scatter_as_planned() -> None:
-    """48 fits give a standard deviation to 10 %: three of these are allowed."""
+    """24 fits give a standard deviation to 15 %: two of these are allowed."""
     t = np.linspace(0.0, 12.0, 241)
     found = plan({"decay": {"duration": 12.0, "samples": t, "start": {"q": 1.0}}})
     rng = np.random.default_rng(4)
     fits = []
-    for _ in range(48):
+    for _ in range(24):
         y = decay(t, C, K, 1.0, 0.0) + NOISE * rng.standard_normal(t.size)
         fits.append(list(ns.fit(oscillator(), {"q": (t, y)}, ["c", "k"], progress=False).values()))
     np.testing.assert_allclose(np.std(fits, axis=0), found["uncertainty"].values[0], rtol=0.31)

@@ -131,7 +131,7 @@ def test_the_band_of_a_branch_with_folds_scales_as_its_motions_do() -> None:
     s = scaled_stop()
     orbit = ns.find_orbit(s)
     found = known(s, {"a": 0.05})
-    band = ns.propagate(found, ns.continue_orbit, orbit, "omega", (0.8, 1.9), draws=4, step=0.01, **QUIET)
+    band = ns.propagate(found, ns.continue_orbit, orbit, "omega", (0.8, 1.9), draws=3, step=0.015, **QUIET)
     assert "fold" in band["special_kind"].values
     amplitude = band["maximum"].sel(state="q").values
     folds = band["special_value"].values[band["special_kind"].values == "fold"]

@@ -63,9 +63,9 @@ def test_a_resonance_has_the_information_of_its_formula() -> None:
 
 
 def test_intervals_hold_the_truth() -> None:
-    """Standard scores of 16 noisy responses are of mean 0 and deviation 1, the noise known or found."""
+    """Standard scores of ten noisy responses are of mean 0 and deviation 1, the noise known or found."""
     rng, scores, system, at = np.random.default_rng(1), {None: [], ERROR: []}, linear(), OMEGA[::2]
-    for _ in range(16):
+    for _ in range(10):
         y = amplitude()[::2] + ERROR * rng.standard_normal(len(at))
         for error, held in scores.items():
             found = ns.fit(system, response(y, error, at=at), ["c", "k"], progress=False)

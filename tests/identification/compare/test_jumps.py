@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,21 +14,28 @@ from nonsmooth.identification.compare.response import AmplitudeJump, jumps_in_st
 ZERO = np.zeros
 
 
+def amplitudes(w: float) -> np.ndarray:
+    """Of x'' + 0.05 x' + x + x^3 = 0.1 cos(w t) by one harmonic."""
+    # (1 - w^2 + 3/4 s)^2 s + (0.05 w)^2 s = 0.01 for s = A^2
+    roots = np.roots([9 / 16, 1.5 * (1 - w**2), (1 - w**2) ** 2 + (0.05 * w) ** 2, -0.01])
+    return np.sqrt(np.sort(roots[np.abs(roots.imag) < 1e-9].real))
+
+
+@cache
+def folds() -> tuple[float, float]:
+    """The ends of the frequencies with three amplitudes."""
+    fine = np.arange(0.6, 2.4, 1e-4)
+    three = fine[[len(amplitudes(w)) == 3 for w in fine]]
+    return float(three.min()), float(three.max())
+
+
 def duffing(direction: str, step: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Amplitude of x'' + 0.05 x' + x + x^3 = 0.1 cos(w t) by one harmonic, carried; and where the branch ends."""
-
-    def amplitudes(w: float) -> np.ndarray:
-        # (1 - w^2 + 3/4 s)^2 s + (0.05 w)^2 s = 0.01 for s = A^2
-        roots = np.roots([9 / 16, 1.5 * (1 - w**2), (1 - w**2) ** 2 + (0.05 * w) ** 2, -0.01])
-        return np.sqrt(np.sort(roots[np.abs(roots.imag) < 1e-9].real))
-
+    """The amplitude, carried; and where the branch ends."""
     values = np.arange(0.6, 2.4, step)
     order = values if direction == "up" else values[::-1]
     pick = -1 if direction == "up" else 0
     heights = np.array([amplitudes(w)[pick] for w in order])
-    fine = np.arange(0.6, 2.4, 1e-4)
-    three = fine[[len(amplitudes(w)) == 3 for w in fine]]
-    return order, heights, float(three.max() if direction == "up" else three.min())
+    return order, heights, folds()[direction == "up"]
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])

@@ -109,7 +109,7 @@ def fitted(runs, **options):
     return free_decay(runs, **options)
 
 
-@pytest.mark.parametrize("counts", [1, 20])
+@pytest.mark.parametrize("counts", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_a_tap_that_slipped_is_named_and_left_out(counts):
     runs = taps((0.1, -0.09, 0.08, -0.07))
     runs[2] = slipped(runs[2], counts)
