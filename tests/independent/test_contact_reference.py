@@ -157,7 +157,7 @@ def test_a_moving_stop() -> None:
     assert np.allclose(out.states, [[-0.2, -2.0]], atol=1e-15)
 
 
-@pytest.mark.parametrize("e", [0.3, 0.5, 0.8, 0.985, 0.99])
+@pytest.mark.parametrize("e", [0.3, 0.8, 0.985])
 def test_rest_time_of_a_bouncing_ball(e: float) -> None:
     h, g = 1.0, 9.81
     ball = one_mass(load=-g, floor=Stop(ONE, 0.0, side=-1, restitution=e))
@@ -167,7 +167,7 @@ def test_rest_time_of_a_bouncing_ball(e: float) -> None:
     assert np.array_equal(out.states, [[0.0, 0.0]])
 
 
-@pytest.mark.parametrize("w", [0.8, 0.9, 1.0, 1.04746, 1.1, 1.15])
+@pytest.mark.parametrize("w", [0.8, 1.04746, 1.15])
 def test_two_plastic_stops(w: float) -> None:
     system = one_mass(damping=0.2, load=(0, 1.0, 0), frequency=w, right=Stop(ONE, 1.0), left=Stop(ONE, -1.0, side=-1))
     period = 2 * np.pi / w

@@ -48,7 +48,7 @@ def drawn(seed: int, least: int) -> tuple[dict[str, Any], dict[str, Any]]:
     return given, gaps
 
 
-@pytest.mark.parametrize(("seed", "least"), [(0, 2), (4, 2), (5, 2), (15, 2), (0, 6), (3, 6), (8, 6)])
+@pytest.mark.parametrize(("seed", "least"), [(0, 2), (5, 2), (15, 2), (3, 6), (8, 6)])
 def test_contacts_are_impacts_and_gaps_that_close(seed: int, least: int) -> None:
     given, gaps = drawn(seed, least)
     system = ns.mechanical(**given)

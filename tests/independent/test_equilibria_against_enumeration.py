@@ -10,7 +10,7 @@ import equilibria_enumeration
 import numpy as np
 import pytest
 
-SOME = (0, 6, 9, 35, 44, 105, 213, 245)  # those that take less
+SOME = (0, 9, 44, 213)  # those that take less
 
 
 @pytest.mark.parametrize("seed", SOME)

@@ -67,7 +67,13 @@ def test_the_steady_motion_without_contact_is_a_fixed_point() -> None:
 
 
 @pytest.mark.parametrize(
-    ("n", "start", "to"), [(1, 0.41, 0.395), (2, 0.28, 0.268), (4, 0.25, 0.243), (8, 0.2415, 0.2397)]
+    ("n", "start", "to"),
+    [
+        (1, 0.41, 0.395),
+        (2, 0.28, 0.268),
+        pytest.param(4, 0.25, 0.243, marks=pytest.mark.slow),
+        pytest.param(8, 0.2415, 0.2397, marks=pytest.mark.slow),
+    ],
 )
 def test_flips_of_figure_11(n: int, start: float, to: float) -> None:
     p = dict(known.TABLE_1, rho=start, g=-0.0045, omega=3.69)

@@ -104,7 +104,7 @@ def test_without_located_crossings_the_order_is_lost(name: str, largest: float) 
         "two spirals": (reference.spiral, reference.SPIRAL_START, reference.SPIRAL_DURATION),
         "stiffer side": (reference.duffing, reference.DUFFING_START, DURATION),
     }[name]
-    steps = np.geomspace(largest, largest / 100, 13)
+    steps = np.geomspace(largest, largest / 100, 7)
     found = np.array([np.linalg.norm(reference.march(field, start, duration, h) - truth(name)) for h in steps])
     located = errors(name, steps[-1:], method="rkf45")[0]
     print(f"\n{name}, not located: order {order(steps, found):.2f}, error {found[-1]:.1e} where located {located:.1e}")

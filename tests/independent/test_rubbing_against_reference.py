@@ -92,7 +92,7 @@ def test_systems_side_by_side_move_as_alone(pairs: list[tuple[int, int]]) -> Non
         assert np.abs(computed(times, *systems) - states).max() < 1e-7, seeds
 
 
-FLOORS = (5, 14, 15, 17, 21, 29, 38, 49)  # frictions and stops that hold the same coordinate
+FLOORS = (5, 15, 21, 38)  # frictions and stops that hold the same coordinate
 LEFT = (298,)  # a force touches its bound where a speed is zero: instant and kernel differ in what is rounding
 
 
