@@ -36,18 +36,18 @@ def test_cantor_sets(ratio: float) -> None:
 
 
 def test_a_product_of_cantor_sets_and_smooth_sets() -> None:
-    product = correlation_dimension(np.stack([cantor(12000), cantor(12000)], axis=1), window=0)
+    product = correlation_dimension(np.stack([cantor(8000), cantor(8000)], axis=1), window=0)
     assert abs(float(product.dimension) - 2 * np.log(2) / np.log(3)) < 0.06
     angle = RNG.uniform(0, 2 * np.pi, 5000)
     circle = correlation_dimension(np.stack([np.cos(angle), 1e3 * np.sin(angle)], axis=1), window=0)
     assert abs(float(circle.dimension) - 1) < 0.02 and circle.scaling == 1
-    square = correlation_dimension(RNG.uniform(0, 1, (10000, 2)), window=0)
+    square = correlation_dimension(RNG.uniform(0, 1, (6000, 2)), window=0)
     assert abs(float(square.dimension) - 2) < 0.05 and square.scaling == 1
 
 
 def test_henon() -> None:
     """Grassberger and Procaccia (1983), Table 1: 1.21 +- 0.01 for a = 1.4, b = 0.3."""
-    found = correlation_dimension(henon(15000))
+    found = correlation_dimension(henon(8000))
     assert abs(float(found.dimension) - 1.21) < 0.03
     assert found.scaling == 1 and found.decades > 1.0 and found.slope_spread < 0.1
 

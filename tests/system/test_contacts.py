@@ -246,7 +246,7 @@ def between(mass: float) -> tuple[xr.Dataset, np.ndarray]:
     return run, np.array(held)[run["mode"].values]
 
 
-MASSES = [0.55, 0.7, 0.838, 0.95, 1.1, 1.35]
+MASSES = [0.7, 0.838, 1.35]
 OTHERS = [mass for mass in np.arange(0.55, 1.45, 0.05).round(3) if mass not in MASSES]
 
 
@@ -354,7 +354,7 @@ def spring_at_four_tenths(calculus: str) -> tuple[ns.System, ns.System]:
     return modes, block(modes={"all": field(0.0)}, elements={**HOLDS, "spring": spring})
 
 
-@pytest.mark.parametrize("start", [[0.6, 0.2], [0.0, 0.0], [0.9, 1.0]])
+@pytest.mark.parametrize("start", [[0.6, 0.2], [0.0, 0.0]])
 def test_modes_of_the_systems_own_are_those_of_an_elastic_stop(start: list[float], calculus: str) -> None:
     """A run may begin in either mode."""
     grid = np.linspace(0, 5 * 2 * np.pi / 0.7, 101)

@@ -172,7 +172,7 @@ def test_a_mass_leaves_its_plate_where_its_friction_turns_round(method: str) -> 
 
 
 @pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
-@pytest.mark.parametrize("speed", [-1e-12, -1e-16, -1e-17, -1e-30, 0.0, 1e-17, 1e-12])
+@pytest.mark.parametrize("speed", [-1e-12, -1e-17, 0.0, 1e-17])
 def test_two_masses_that_friction_holds_stay_whatever_the_rounding_of_their_speeds(speed: float, method: Any) -> None:
     """Pushed together by .2 and -.1, which leaves .1 for a friction of .5."""
     elements = {
@@ -187,7 +187,7 @@ def test_two_masses_that_friction_holds_stay_whatever_the_rounding_of_their_spee
 
 @pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-@pytest.mark.parametrize("speed", [0.0, 4.8e-49, 1e-20, 1e-16, 1e-12, 5e-11, 1e-9])
+@pytest.mark.parametrize("speed", [0.0, 4.8e-49, 1e-16, 5e-11])
 def test_a_contact_that_parts_by_less_than_rounding_holds(speed: float, restitution: float, method: Any) -> None:
     """Pressed by a force of 1 a mass turns after v^2 / 2: it rests at the other one, which friction holds."""
     system = ns.mechanical(
