@@ -10,10 +10,10 @@ import pytest
 
 #: Sizes that show the same in less time than those of the pictures.
 SMALL = {
-    "basins": {"points": 40},
-    "chart": {"points": 40},
+    "basins": {"points": 28},
+    "chart": {"points": 24},
     "basin_fractions": {"points": 14, "starts": 30},
-    "element_loads": {"points": 41},
+    "element_loads": {"points": 25},
     "real_silverbox": {"samples": 600},
     "relief_valve": {"points": 89},
     "three_masses": {"points": 25, "forces": 3},

@@ -38,9 +38,10 @@ SHORTER = {
     ],
     "index": [("0.5, 601)", "0.5, 151)", True)],
     "orbits_and_branches": [
-        ('"omega": (2.5, 8.0)', '"omega": (4.4, 6.0)', True),
+        ('"omega": (2.5, 8.0), "rho": (0.05, 0.3)', '"omega": (4.4, 6.0), "rho": (0.07, 0.16)', True),
+        ("(0.05, 3.0)", "(0.5, 2.3)", True),
         ("range=(7.0, 10.0)", "range=(7.5, 8.6)", True),
-        ("length=4.0", "length=3.0", True),
+        ("length=4.0", "length=2.0", True),
         ("(-0.0015, 0.002)", "(0.0003, 0.0016)", True),
     ],
     "safe_region": [
@@ -51,6 +52,8 @@ SHORTER = {
     "smoothing": [
         ("np.geomspace(1e-6, 1e-3, 7)", "[3e-5, 1e-4]", True),
         ("np.geomspace(1e-4, 1e-1, 7)", "[3e-3, 1e-2]", True),
+        ("n_starts=60", "n_starts=30", True),
+        ("periods=4000", "periods=2500", True),
     ],
     "uncertainty": [("draws=60", "draws=12", False)],
 }
