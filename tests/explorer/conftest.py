@@ -81,7 +81,7 @@ class Page:
     def until(self, what: str, timeout: float = PATIENCE) -> Any:
         """Wait until a JavaScript expression is true."""
         try:
-            return self.tab.wait_for_function(what, timeout=1000 * timeout)
+            return self.tab.wait_for_function(what, timeout=1000 * timeout, polling=20)
         except Exception as error:
             told = self.tab.evaluate("({...document.documentElement.dataset})")
             raise AssertionError(f"{what}: {told}, {self.readout()}, {self.notes()!r}, {self.ui()}") from error

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import runpy
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -67,10 +65,6 @@ def run(script: Path) -> None:
     plt.close("all")
 
 
-def in_a_process(script: Path) -> None:
-    subprocess.run([sys.executable, script.name], cwd=script.parent, check=True)
-
-
 def same(path: Path, shown: Any) -> None:
     made = ns.load(path)
     assert made.drop_attrs().identical(shown.drop_attrs())
@@ -110,9 +104,9 @@ def test_the_script_and_the_study_file_make_what_was_shown(
 def test_a_system_of_ones_own_and_a_smoothed_one_are_written_whole(results: dict[str, Any], tmp_path: Path) -> None:
     made = ns.simulate(SYSTEM.smoothed(1e-4), periods=1, start=[0.0, 0.0])
     own = replace(STATE, model="given")
-    for state, by in (STATE, run), (own, in_a_process):
+    for state in (STATE, own):
         script = write(tmp_path, "history", "py", {"run": made}, state)
-        by(script)
+        run(script)
         same(script.with_suffix(".nc"), made)
     study = write(tmp_path, "portrait", "toml", {"run": made}, own)  # it carries the system, in text
     assert cli.main(["run", str(study), "--quiet"]) == 0

@@ -90,17 +90,6 @@ def test_branches_that_nobody_waits_for_are_cancelled_and_the_worker_stays(page:
     assert server.workers() and set(server.workers()) <= set(workers)  # that of an earlier page may have ended
 
 
-def test_the_spectrum_of_a_motion_without_contact_is_one_line_of_the_linear_amplitude(page: Any) -> None:
-    page.write("v-p.g", "1")
-    page.tab.click("#tab-spectrum")
-    page.until_done()
-    p = {one["name"]: page.value(one["name"]) for one in page.ui()["parameters"]}
-    known = p["rho"] / p["m"] / np.hypot(2 * p["k"] / p["m"] - p["omega"] ** 2, p["c"] * p["omega"] / p["m"])
-    lines = data(page, "lines")
-    assert list(lines["x"]) == [1.0]
-    assert lines["y"][0] == pytest.approx(known, rel=1e-6)
-
-
 def test_a_period_4_motion_has_lines_at_quarters(page: Any) -> None:
     page.write("v-p.rho", "0.26")
     page.tab.focus("#tab-history")
@@ -112,24 +101,6 @@ def test_a_period_4_motion_has_lines_at_quarters(page: Any) -> None:
     assert {0.25, 0.5, 0.75, 1.0} <= set(np.round(lines["x"], 9))
     assert tip(page, "spectrum", 1.0, float(lines["y"].max()) / 30, "1 · ")
     page.picture("spectrum")
-
-
-def test_the_response_without_contact_is_the_linear_resonance_curve(page: Any) -> None:
-    page.write("v-p.g", "1")
-    page.tab.click("#tab-response")
-    page.write("response.low", "3")
-    page.write("response.high", "7")
-    page.tab.select_option("#shown", "x")
-    page.until_done()
-    p = {one["name"]: page.value(one["name"]) for one in page.ui()["parameters"]}
-    for word in ("up", "down"):
-        drawn = data(page, f"response {word}")
-        omega = drawn["x"]
-        assert (omega[0], omega[-1], len(omega)) == (3.0, 7.0, 401)
-        known = p["rho"] / p["m"] / np.hypot(2 * p["k"] / p["m"] - omega**2, p["c"] * omega / p["m"])
-        np.testing.assert_allclose(drawn["y"], known, rtol=1e-5)
-    click(page, "response", 5.0, 0.02)
-    assert page.value("omega") == 5.0
 
 
 def test_a_jump_of_figure_9_and_the_orbits_of_two_quick_clicks_on_its_branches(page: Any) -> None:
