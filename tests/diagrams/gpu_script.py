@@ -32,7 +32,7 @@ results = {
         transient=20,
         keep=12,
         max_period=4,
-        lyapunov=32,
+        lyapunov=40,
     ),
     "every_period": counted(
         ns.chart,

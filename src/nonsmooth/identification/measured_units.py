@@ -33,9 +33,13 @@ def compare_units(what: str, theirs: str, ours: str, remedy: str, gain: float = 
 
 
 def units_of(theory: System | xr.Dataset) -> dict[str, str]:
-    """The units of states and parameters, of a system or of a result."""
+    """The units of states and parameters (and outputs), of a system or of a result."""
     if not isinstance(theory, xr.Dataset):
-        return dict(theory.states) | {name: one.unit or "" for name, one in theory.parameters.items()}
+        return (
+            dict(theory.outputs)
+            | dict(theory.states)
+            | {name: one.unit or "" for name, one in theory.parameters.items()}
+        )
     states = zip(theory["state"].values.tolist(), theory["state_unit"].values.tolist(), strict=True)
     return dict(states) | {str(name): str(one.attrs.get("units", "")) for name, one in theory.coords.items()}
 

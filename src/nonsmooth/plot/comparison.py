@@ -85,6 +85,32 @@ def comparison_time(ax: Axes, result: xr.Dataset, *, y: Name | None = None, peri
     name_axes(ax, y=name_and_unit(result, name))
 
 
+@figure()
+def comparison_record(ax: Axes, result: xr.Dataset, *, y: Name | None = None) -> None:
+    """Draw a record under measured inputs over its time: readings, the predicted motion and its band.
+
+    Parameters
+    ----------
+    result
+        A comparison of a record; of a part of it ``result.sel(time=slice(2, 5))``.
+    ax
+        Where to draw; a new one-column figure if None.
+    y
+        The state or output; by default the first.
+    """
+    check_kind(result, "record")
+    (name,) = only_states(result, y)
+    here, time = result.sel(state=name), result["time"].values
+    level = 100 * read_provenance(result)["options"].get("level", 0.95)
+    shade_reach(ax, here, time, color=THEORY, alpha=0.25, label=f"{level:g} % band")
+    ax.plot(time, here["theory"].values, color=THEORY, label="theory")
+    looks: style.Properties = {"color": MEASURED, "markersize": 1.6, "markeredgewidth": 0}
+    ax.plot(time, here["measured"].values, "o", label=measured_label(result), **looks)
+    ax.margins(x=0)
+    style.legend(ax, columns=3)
+    name_axes(ax, name_and_unit(result, "time"), name_and_unit(result, name))
+
+
 @figure(ratio=0.85)
 def comparison_phase_portrait(
     ax: Axes,

@@ -33,8 +33,8 @@ def check_system(system: Any, verb: str, inputs: bool = False) -> Any:
         if system.inputs and not inputs:
             raise ValueError(
                 f"{verb} takes systems without inputs; {system.name!r} has {', '.join(map(repr, system.inputs))}: "
-                "simulate, sensitivity, fit, select_model and plan_experiment take their course; elsewhere write it as "
-                "a function of t and p"
+                "simulate, sensitivity, fit, compare, select_model and plan_experiment take their course; elsewhere "
+                "write it as a function of t and p"
             )
         return system
     name = getattr(system, "__name__", None)

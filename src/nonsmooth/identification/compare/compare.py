@@ -15,6 +15,7 @@ from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.compare.motion import compare_motion
+from nonsmooth.identification.compare.record import compare_record, read_record
 from nonsmooth.identification.compare.response import compare_diagram, compare_response
 from nonsmooth.identification.fit.steady import is_steady, of_table
 from nonsmooth.identification.measured_units import compare_units_of_readings, units_of
@@ -49,6 +50,7 @@ def compare(
     direction: Literal["up", "down", "both"] = "down",
     start: Any = None,
     section_phase: Any = 0.0,
+    inputs: Any = None,
     **options: Unpack[Comparing],
 ) -> xr.Dataset:
     r"""Lay a measurement over the theory: what both show, how far apart they are, and how far they may be.
@@ -63,7 +65,8 @@ def compare(
       given), or a result of ``frequency_response``. It is compared in one state, the first that it holds, or, where it
       names none, the first of the theory: ``measured.sel(state="q2")`` takes another;
     - a **diagram**: ``section(<parameter>, iterate, state)`` of steady runs, or ``section(iterate, state)`` with the
-      parameter over ``iterate`` for a slow rise.
+      parameter over ``iterate`` for a slow rise;
+    - a **record**, of a System with inputs: a recording as :func:`nonsmooth.fit` takes it, over its own time.
 
     Parameters
     ----------
@@ -96,6 +99,9 @@ def compare(
         0. Of all motions they lead to the nearest is taken; all period numbers are kept.
     section_phase : float or list of float
         Phases of the stroboscopic sections, in forcing periods.
+    inputs : mapping of input to channel, Input or (time, values), optional
+        The courses of the system's inputs, as in :func:`nonsmooth.fit`. The motion begins with ``start`` where the
+        record does, or as the fit that gave the ``parameters`` found it.
 
     Returns
     -------
@@ -147,9 +153,12 @@ def compare(
         options["draws"] = DRAWS if uncertain and hasattr(theory, "parameters") else 0
     if not 0 < options["level"] < 1:
         raise ValueError(f"level = {options['level']!r} must lie between 0 and 1, as 0.95")
+    record = None
     if isinstance(theory, System):
-        check_system(theory, "compare")
-    if not isinstance(measured, xr.Dataset) or channels is not None:
+        check_system(theory, "compare", inputs=True)
+    if isinstance(theory, System) and (theory.inputs or inputs is not None):
+        record = read_record(nominal(theory, parameters, set_), measured, channels, run, inputs, parameters)
+    elif not isinstance(measured, xr.Dataset) or channels is not None:
         if not isinstance(theory, System):
             raise TypeError(f"a recording is laid over a System, not over a result; of a measured motion: {FORMS}")
         if is_steady(measured):
@@ -157,12 +166,17 @@ def compare(
         else:
             here, told = nominal(theory, parameters, set_), getattr(parameters, "extra", {})
             measured = recorded_motion(measured, here, channels, run, told)
-    kind, states = _kind(measured, parameter), _states(measured, theory)
-    compare_units_of_readings(measured, units_of(theory))
-    if kind == "response":
-        states, spread = states[:1], np.full(1, np.nan)
+    if record is not None:
+        synthetic = "yes" if getattr(measured, "synthetic", False) else "no"
+        kind, states = "record", list(record.sensors)
+        measured = xr.Dataset(attrs={"synthetic": synthetic, "title": record.records[0].name})
+        own = record.noise / [abs(sensor.gain) for sensor in record.sensors.values()]
+        spread = own if noise is None else _noise(measured, noise, states)
     else:
-        spread = _noise(measured, noise, states)
+        kind, states = _kind(measured, parameter), _states(measured, theory)
+        compare_units_of_readings(measured, units_of(theory))
+        states = states[:1] if kind == "response" else states
+        spread = np.full(1, np.nan) if kind == "response" else _noise(measured, noise, states)
     solver = solver_of(options)
     rest: dict[str, Any] = {key: value for key, value in options.items() if key not in solver}
     model = Model(theory, states, parameters, set_, spread, solver, **rest)
@@ -173,11 +187,13 @@ def compare(
         "section_phase": section_phase,
         **options,
     }
-    if kind != "motion":
+    if kind in ("response", "diagram"):
         name = parameter or (_forcing(theory) if kind == "response" else _swept(measured))
         if model.system is not None:
             check_parameter(name, model.theory)
-    if kind == "response":
+    if record is not None:
+        variables = compare_record(record, model, start)
+    elif kind == "response":
         variables = compare_response(measured, model, name=name)
     elif kind == "diagram":
         phase = real_number(section_phase, "section_phase")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -16,6 +16,10 @@ from nonsmooth.identification.finding import Estimate
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.system import System
+
+if TYPE_CHECKING:
+    from nonsmooth.identification.fit.records import Record
+    from nonsmooth.identification.fit.sensors import Sensor
 
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
 PIECE = 75.0  # s
@@ -87,6 +91,45 @@ def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = (
     )
 
 
+def only_run(records: list[Record]) -> Record:
+    """The run that is compared; ValueError where there are several."""
+    if len(records) > 1:
+        raise ValueError(
+            f"compare lays one run over the model: run = ... one of {', '.join(record.name for record in records)}"
+        )
+    return records[0]
+
+
+def told_sensors(
+    sensors: Mapping[str, Sensor], record: Record, found: Mapping[str, Estimate], system: System
+) -> tuple[dict[str, Sensor], Callable[[str, float], float]]:
+    """Sensors with the gain, offset and delay that a fit found of those given by their channel alone; and what tells a
+    finding of this run, or else what is known."""
+    found = {key: one for key, one in found.items() if key.split(",")[0] not in system.values}
+
+    def told(name: str, known: float) -> float:
+        one = found.get(name, found.get(f"{name}, {record.name}"))
+        if one is None and any(key.startswith(f"{name}, ") for key in found):
+            warnings.warn(
+                f"the fit found {name!r} of its runs, but none of run {record.name!r}: it is taken as {known:g}",
+                stacklevel=7,
+            )
+        return one.value if one else known
+
+    as_read: dict[str, Sensor] = {}
+    for q, sensor in sensors.items():
+        gain, offset = told(q + ".gain", sensor.gain), told(q + ".offset", sensor.offset)
+        read = replace(sensor, gain=gain, offset=offset, delay=told(q + ".delay", sensor.delay))
+        by_name = sensor == type(sensor)(sensor.channel)
+        as_read[q] = read if by_name else sensor
+        if not by_name and read != sensor:
+            warnings.warn(
+                f"{sensor} of {q} stands; the fit found {read}: give the channel's name alone to read it so",
+                stacklevel=6,
+            )
+    return as_read, told
+
+
 def recorded_motion(
     recording: Any, system: System, channels: Any, run: str | None, found: Mapping[str, Estimate]
 ) -> xr.Dataset:
@@ -97,40 +140,14 @@ def recorded_motion(
     a channel that is given by its name alone.
     """
     from nonsmooth.identification.fit.records import irregularity, read_records
-    from nonsmooth.identification.fit.sensors import Sensor
 
     sensors, records, _ = read_records(system, recording, {"measured": channels, "runs": run})
-    if len(records) > 1:
-        raise ValueError(
-            f"compare lays one run over the model: run = ... one of {', '.join(record.name for record in records)}"
-        )
-    (record,), period = records, system.period()
+    record, period = only_run(records), system.period()
     if period is None:
         raise ValueError(f"{system.name!r} has no forcing period; compare takes forced systems")
     if outputs := [name for name in sensors if name not in system.states]:
         raise ValueError(f"{', '.join(outputs)}: no state of {system.name!r}; compare lays states over the model")
-    found = {key: one for key, one in found.items() if key.split(",")[0] not in system.values}
-
-    def told(name: str, known: float) -> float:
-        """Return the finding of this run, or else what is known."""
-        one = found.get(name, found.get(f"{name}, {record.name}"))
-        if one is None and any(key.startswith(f"{name}, ") for key in found):
-            warnings.warn(
-                f"the fit found {name!r} of its runs, but none of run {record.name!r}: it is taken as {known:g}",
-                stacklevel=6,
-            )
-        return one.value if one else known
-
-    for q, sensor in sensors.items():
-        gain, offset = told(q + ".gain", sensor.gain), told(q + ".offset", sensor.offset)
-        read = replace(sensor, gain=gain, offset=offset, delay=told(q + ".delay", sensor.delay))
-        if sensor == Sensor(sensor.channel):
-            sensors[q] = read
-        elif read != sensor:
-            warnings.warn(
-                f"{sensor} of {q} stands; the fit found {read}: give the channel's name alone to read it so",
-                stacklevel=5,
-            )
+    sensors, told = told_sensors(sensors, record, found, system)
     if len({sensor.delay for sensor in sensors.values()}) > 1 or np.isnan(record.values).any(axis=1).mean() > 0.5:
         raise ValueError("the channels have clocks or delays of their own: compare them one by one, channels={...}")
     scale = np.array([sensor.gain for sensor in sensors.values()])

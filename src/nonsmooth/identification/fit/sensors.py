@@ -238,7 +238,7 @@ def read_unknowns(
     ``steady`` runs have no phase. A parameter that is set in a run is known there; one that is called ``clock`` or
     ``phase`` is a parameter as any other.
     """
-    given = [parameters] if isinstance(parameters, str) else list(parameters)
+    given = [parameters] if isinstance(parameters, str) else list(parameters or ())
     bounds = dict(parameters) if isinstance(parameters, Mapping) else {}
     known = {"clock": (1.0, ""), "phase": (0.0, "periods")}  # first guess and unit of all that may be found
     known |= {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
@@ -248,7 +248,7 @@ def read_unknowns(
             for what, of in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
                 known[f"{q}.{what}"] = (getattr(sensors[q], what), of)
     allowed = {name: unit for name, (_, unit) in known.items()}
-    if not given:
+    if not given and parameters is not None:  # None: all is known
         raise ValueError(f"parameters names nothing to be found; allowed: {', '.join(allowed)}")
     if twice := [name for name in given if given.count(name) > 1]:
         raise ValueError(f"parameters names {twice[0]!r} twice; name each once")
