@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -102,9 +102,9 @@ def only_run(records: list[Record]) -> Record:
 
 def told_sensors(
     sensors: Mapping[str, Sensor], record: Record, found: Mapping[str, Estimate], system: System
-) -> tuple[dict[str, Sensor], Callable[[str, float], float]]:
-    """Sensors with the gain, offset and delay that a fit found of those given by their channel alone; and what tells a
-    finding of this run, or else what is known."""
+) -> tuple[dict[str, Sensor], dict[str, float]]:
+    """Sensors with the gain, offset and delay that a fit found of those given by their channel alone; and what it found
+    of this run's clock and phase, and of the noise of each quantity (NaN: nothing)."""
     found = {key: one for key, one in found.items() if key.split(",")[0] not in system.values}
 
     def told(name: str, known: float) -> float:
@@ -127,7 +127,10 @@ def told_sensors(
                 f"{sensor} of {q} stands; the fit found {read}: give the channel's name alone to read it so",
                 stacklevel=6,
             )
-    return as_read, told
+    beside = {"clock": 1.0, "phase": 0.0, **{f"{q}.noise": np.nan for q in sensors}}
+    for name, known in beside.items():
+        beside[name] = told(name, known)
+    return as_read, beside
 
 
 def recorded_motion(
@@ -156,13 +159,13 @@ def recorded_motion(
         for sensor, y in zip(sensors.values(), record.values.T, strict=True)
     ]
     u = (record.values - [sensor.offset for sensor in sensors.values()]) / scale
-    time = told("clock", 1.0) * record.time - next(iter(sensors.values())).delay
+    time = told["clock"] * record.time - next(iter(sensors.values())).delay
     synthetic = "yes" if getattr(recording, "synthetic", False) else "no"
     return xr.Dataset(
         {
             "u": (("time", "state"), u),
             "u_error": (("time", "state"), np.broadcast_to(error / np.abs(scale), u.shape)),
-            "phase": ("time", time / period + told("phase", 0.0)),
+            "phase": ("time", time / period + told["phase"]),
         },
         {"time": time, "state": list(sensors)},
         {"synthetic": synthetic, "title": record.name},

@@ -30,8 +30,8 @@ def read_record(system: System, recording: Any, channels: Any, run: str | None, 
     """The one run as a fit sees it, without unknowns, its sensors as a fit has found them."""
     problem = problem_of(system, recording, None, {"measured": channels, "runs": run}, inputs=inputs)
     sensors, told = told_sensors(problem.sensors, only_run(problem.records), getattr(found, "extra", {}), system)
-    noise = [told(f"{q}.noise", known) for q, known in zip(sensors, problem.noise.tolist(), strict=True)]
-    return replace(problem, sensors=sensors, noise=np.array(noise))
+    noise = np.array([told[f"{q}.noise"] for q in sensors])
+    return replace(problem, sensors=sensors, noise=np.where(np.isfinite(noise), noise, problem.noise))
 
 
 def compare_record(problem: Windows, model: Model, start: Any) -> dict[str, Any]:
