@@ -55,12 +55,12 @@ def compare_record(problem: Windows, model: Model, start: Any) -> dict[str, Any]
     gain, offset = (np.array([getattr(one, name) for one in sensors]) for name in ("gain", "offset"))
 
     def predicted(system: System, window: Window) -> FloatArray | None:
-        now, theta = replace(problem, system=system), problem.unknowns.guess
-        motion = now.motion(theta, window, window.start)
+        now = replace(problem, system=problem.system.with_parameters(dict(system.values)))
+        motion = now.motion(problem.unknowns.guess, window, window.start)
         if motion is None:
             return None
         whole = np.full(record.values.shape, np.nan)
-        whole[window.readings] = now.readings(theta, window, motion, False)[0]
+        whole[window.readings] = now.readings(problem.unknowns.guess, window, motion, False)[0]
         return (whole - offset) / gain
 
     assert model.system is not None
