@@ -25,7 +25,8 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
 
     In flight the second differences of the height are gravity plus noise. Where a tenth of the record or more is
     flight, their lower tail is: of those between half and one and a half of their 10 % quantile, the densest half gives
-    gravity by its median and the noise by its width.
+    gravity by its median and the noise by its width. They are taken over as many samples as noise asks for: the fewest
+    at which it leaves flights apart from rest. What those at a flight's ends cannot tell, its parabola does.
 
     Parameters
     ----------
@@ -50,7 +51,42 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     """
     t, z = signal(time, height, least=12, purpose="finding flights")
     step = 1.0 / even_rate(t, height, "finding flights")
-    bend = np.diff(z, 2) / step**2
+    lag = 1
+    while True:
+        free, told = _falling(z, step, lag, threshold, least)
+        rows = [(a, b - 1) for a, b in runs_of(free) if b - a >= least]
+        if (told and rows) or 8 * lag > len(z):
+            break
+        lag += 1
+    if not rows:
+        raise ValueError(
+            f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
+            "mass, upwards, at a rate that shows its flights"
+        )
+    if lag > 1:
+        fall, _, noise = _gravity(t, z, rows)
+        for k, row in enumerate(rows):
+            low, high = rows[k - 1][1] + 1 if k else 0, rows[k + 1][0] - 1 if k + 1 < len(rows) else len(z) - 1
+            rows[k] = _whole(t, z, fall, noise, *row, low, high)
+    acceleration, error, noise = _gravity(t, z, rows)
+    first, last = np.array(rows).T
+    return xr.Dataset(
+        {
+            "first": ("flight", first),
+            "last": ("flight", last),
+            "begin": ("flight", t[first], {"units": "s"}),
+            "end": ("flight", t[last], {"units": "s"}),
+            "acceleration": labelled((), acceleration, "acceleration in flight"),
+            "acceleration_error": ((), error),
+            "noise": labelled((), noise, "standard deviation of a sample"),
+        }
+    )
+
+
+def _falling(z: FloatArray, step: float, lag: int, threshold: float, least: int) -> tuple[NDArray[np.bool_], bool]:
+    """Mark the samples in the middle of free second differences over ``lag`` samples; and whether noise leaves these
+    apart from what rests."""
+    bend = (z[2 * lag :] - 2 * z[lag:-lag] + z[: -2 * lag]) / (lag * step) ** 2
     tail = np.quantile(bend, 0.1)
     falling = bend[(bend < 0.5 * tail) & (bend > 1.5 * tail)]
     fall = spread = 0.0
@@ -61,17 +97,17 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
         fall, spread = np.median(ordered[k : k + half + 1]), width[k] / (2 * 0.6745)
     spread = max(spread, 1e-9 * np.ptp(bend))
     tolerance = min(threshold * spread, 0.4 * abs(fall))  # at rest is never in flight, however great the noise
-    free = np.concatenate([[True], np.abs(bend - fall) < tolerance, [True]])
-    # The middle of a second difference is free where it is; a stretch of free ones is a flight.
-    # The first and the last sample have no second difference of their own: they belong to what lies beside them.
-    rows = [(a, b - 1) for a, b in runs_of(free) if b - a >= least]
-    if not rows or fall >= 0:
-        raise ValueError(
-            f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
-            "mass, upwards, at a rate that shows its flights"
-        )
+    free = np.zeros(len(z), dtype=bool)
+    free[lag:-lag] = (np.abs(bend - fall) < tolerance) & (fall < 0)
+    # the first and the last samples have no second difference of their own: they belong to what lies beside them
+    free[:lag], free[-lag:] = free[lag], free[-lag - 1]
+    return free, bool(3.0 * spread <= 0.4 * abs(fall))
+
+
+def _gravity(t: FloatArray, z: FloatArray, rows: list[tuple[int, int]]) -> tuple[float, float, float]:
+    """The acceleration of all flights with its error, and the noise of a sample; of each its own line is taken out."""
     parts, freedom = [], -1
-    for a, b in rows:  # of each flight its own line is taken out
+    for a, b in rows:
         s = t[a : b + 1] - t[a]
         Q, _ = np.linalg.qr(np.column_stack([np.ones_like(s), s]))
         parts.append([y - Q @ (Q.T @ y) for y in (0.5 * s * s, z[a : b + 1])])
@@ -80,18 +116,24 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     acceleration = q @ y / (q @ q)
     left = y - acceleration * q
     noise = math.sqrt(left @ left / max(freedom, 1))
-    first, last = np.array(rows).T
-    return xr.Dataset(
-        {
-            "first": ("flight", first),
-            "last": ("flight", last),
-            "begin": ("flight", t[first], {"units": "s"}),
-            "end": ("flight", t[last], {"units": "s"}),
-            "acceleration": labelled((), acceleration, "acceleration in flight"),
-            "acceleration_error": ((), noise / math.sqrt(q @ q)),
-            "noise": labelled((), noise, "standard deviation of a sample"),
-        }
-    )
+    return acceleration, noise / math.sqrt(q @ q), noise
+
+
+def _whole(
+    t: FloatArray, z: FloatArray, fall: float, noise: float, a: int, b: int, low: int, high: int
+) -> tuple[int, int]:
+    """A flight with the samples beside it, as far as they lie on its parabola within three errors."""
+
+    def on(k: int) -> bool:
+        s = t[a : b + 1] - t[k]
+        (_, here), covariance = np.polyfit(s, z[a : b + 1] - 0.5 * fall * s * s, 1, cov="unscaled")
+        return bool(abs(z[k] - here) <= 3.0 * noise * math.sqrt(1.0 + covariance[1, 1]))
+
+    while a > low and on(a - 1):
+        a -= 1
+    while b < high and on(b + 1):
+        b += 1
+    return a, b
 
 
 def restitution(
