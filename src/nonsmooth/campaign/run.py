@@ -234,14 +234,14 @@ def on_cluster(
     ConnectionError
         The scheduler is gone; what has come back, or is in the store, stands.
     """
+    if client is not None and not hasattr(client, "scheduler"):
+        raise TypeError(f"client = {shortened(client)}: give dask.distributed.Client(address)")
     try:
         from distributed import as_completed
         from distributed.client import FutureCancelledError
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise ImportError(MISSING) from error
-    if not hasattr(client, "scheduler"):
-        raise TypeError(f"client = {shortened(client)}: give dask.distributed.Client(address)")
     path, key = (None, "") if store is None else (str(store.path.resolve()), store.key)
     family = uuid.uuid4().hex[:16]  # never the names of a client that is gone: its tasks may be half forgotten
     order = iter(chunks)
