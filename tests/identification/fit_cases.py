@@ -14,7 +14,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.errors import SystemDefinitionError
 
 
 def march(fields, events, mode, u, times):
@@ -95,7 +94,7 @@ class Case:
             far = {name: self.truth[name] * (1.0 + off * sign) for name, sign in zip(self.find, signs, strict=True)}
             try:
                 return self.system().with_parameters({**self.truth, **far})
-            except SystemDefinitionError:  # static friction below the kinetic one
+            except ns.SystemDefinitionError:  # static friction below the kinetic one
                 continue
 
 

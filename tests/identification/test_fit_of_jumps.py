@@ -3,21 +3,11 @@
 import numpy as np
 import pytest
 from tests.identification.driven_mass import driven
+from tests.identification.fit_cases import cell
 
 import nonsmooth as ns
 
 pytestmark = pytest.mark.physics
-
-
-def spiking() -> ns.System:
-    """v' = (I - v) / tau, back to the rest at the threshold 1."""
-    return ns.System(
-        states=["v"],
-        parameters={"I": 1.3, "tau": 1.0, "rest": 0.1},
-        modes={"up": lambda t, u, p: ((p.I - u.v) / p.tau,)},
-        indicators={"fire": lambda t, u, p: u.v - 1},
-        transitions=[ns.Transition("up", "up", when="fire > 0", reset=lambda t, u, p: (p.rest,))],
-    )
 
 
 def spikes(t: np.ndarray, start: float, current: float, tau: float, rest: float) -> np.ndarray:
@@ -53,7 +43,7 @@ def test_a_state_that_fires(off: float) -> None:
     truth, t = {"I": 1.3, "tau": 1.0, "rest": 0.1}, np.arange(0.0, 12.0, 0.05)
     y = spikes(t, 0.3, *truth.values()) + 0.01 * np.random.default_rng(1).normal(size=len(t))
     guess = {name: value * (1 + off) for name, value in truth.items()}
-    found = ns.fit(spiking().with_parameters(**guess), {"v": (t, y)}, list(truth), progress=False)
+    found = ns.fit(cell().with_parameters(**guess), {"v": (t, y)}, list(truth), progress=False)
     for name, value in truth.items():
         assert abs(found[name] - value) < 3 * found.uncertainty[name] < 0.3 * value
     assert not found.anomalies, found.anomalies

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, Any, Literal, TypedDict
 
 from nonsmooth.flow.options import Solver
 from nonsmooth.results.progress import Progress
@@ -75,6 +75,8 @@ class Comparing(Solver, total=False):
         1e-4 is not).
     level : float
         Of the band.
+    direction : {"up", "down", "both"}
+        Of the predicted diagram.
     splits : int
         Random halves drawn of each section cloud.
     seed : int
@@ -86,5 +88,6 @@ class Comparing(Solver, total=False):
     max_period: Annotated[int, at_least(1), Default(16)]
     draws: Annotated[int, at_least(0)] | None
     level: Annotated[float, Default(0.95)]
+    direction: Annotated[Literal["up", "down", "both"], Default("down")]
     splits: Annotated[int, at_least(20), Default(400)]
     seed: Annotated[int, at_least(0), Default(0)]

@@ -92,6 +92,12 @@ def test_what_is_missing_is_said() -> None:
     read, given = {"q": (T, np.sin(T))}, {"force": (T, np.cos(T))}
     with pytest.raises(ValueError, match="nothing says with which q, v_q: give start=, or parameters= as the fit"):
         ns.compare(read, mass(), inputs=given)
+    force = pushed(4)
+    true, _ = driven(T, force, C, 4.0, WALL, 0.7)
+    whole = {"q": (T, true[:, 0])}
+    fitted = ns.fit(mass(), whole, ["k"], inputs={"force": (T, force)}, progress=False)
+    with pytest.raises(ValueError, match="parameters= as the fit of these readings returns them"):
+        ns.compare({"q": (T[:400], true[500:900, 0])}, mass(), inputs={"force": (T, force)}, parameters=fitted)
     with pytest.raises(ValueError, match="inputs: 'force' is missing"):
         ns.compare(read, mass(), start=STILL)
     with pytest.raises(ValueError, match="no inputs"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -47,7 +47,6 @@ def compare(
     noise: Any = None,
     parameter: str | None = None,
     values: Any = None,
-    direction: Literal["up", "down", "both"] = "down",
     start: Any = None,
     section_phase: Any = 0.0,
     inputs: Any = None,
@@ -92,8 +91,6 @@ def compare(
         The parameter of a response (where not given as of :func:`nonsmooth.frequency_response`) or of a diagram.
     values : array, optional
         Of the predicted diagram; 201 over the measured range where not given.
-    direction : {"up", "down", "both"}
-        Of the predicted diagram.
     start : state or list of states, optional
         Where predictions of a motion begin; rest and four measured section points where not given, other states being
         0. Of all motions they lead to the nearest is taken; all period numbers are kept.
@@ -101,7 +98,7 @@ def compare(
         Phases of the stroboscopic sections, in forcing periods.
     inputs : mapping of input to channel, Input or (time, values), optional
         The courses of the system's inputs, as in :func:`nonsmooth.fit`. The motion begins with ``start`` where the
-        record does, or as the fit that gave the ``parameters`` found it.
+        record does, or as the fit of these readings that gave the ``parameters`` found it.
 
     Returns
     -------
@@ -178,12 +175,11 @@ def compare(
         states = states[:1] if kind == "response" else states
         spread = np.full(1, np.nan) if kind == "response" else _noise(measured, noise, states)
     solver = solver_of(options)
-    rest: dict[str, Any] = {key: value for key, value in options.items() if key not in solver}
+    rest: dict[str, Any] = {key: value for key, value in options.items() if key not in (*solver, "direction")}
     model = Model(theory, states, parameters, set_, spread, solver, **rest)
     given = {
         "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
         "parameter": parameter,
-        "direction": direction,
         "section_phase": section_phase,
         **options,
     }
@@ -197,7 +193,9 @@ def compare(
         variables = compare_response(measured, model, name=name)
     elif kind == "diagram":
         phase = real_number(section_phase, "section_phase")
-        variables = compare_diagram(measured, model, name=name, direction=direction, values=values, phase=phase)
+        variables = compare_diagram(
+            measured, model, name=name, direction=options["direction"], values=values, phase=phase
+        )
     else:
         phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(section_phase)]
         if "u" not in measured and len(phases) > 1:

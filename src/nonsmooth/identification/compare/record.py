@@ -104,20 +104,35 @@ def compare_record(problem: Windows, model: Model, start: Any) -> dict[str, Any]
 
 
 def _found_start(problem: Windows, found: Any) -> dict[str, float]:
-    """The start that a fit has found of this run; ValueError where it has none of some states."""
-    extra, (record,) = getattr(found, "extra", {}), problem.records
+    """The start that a fit has found of these very readings; ValueError where it has none of some states."""
+    extra, (record,) = getattr(found, "extra", {}) if _of_fit(problem, found) else {}, problem.records
     own = [*problem.system.states][: problem.system._description.n_own]  # those of inputs are set by the run
     known = {name: _row_of(name, record.name, extra) for name in own}
     if missing := [name for name, row in known.items() if row not in extra]:
         raise ValueError(
             f"under measured inputs a motion begins where the record does, and nothing says with which "
-            f"{', '.join(missing)}: give start=, or parameters= as the fit of this run returns them"
+            f"{', '.join(missing)}: give start=, or parameters= as the fit of these readings returns them"
         )
     if late := [key for key in extra if key.split(",")[0].endswith(".delay")]:
         raise ValueError(
             f"the fit found {late[0]!r}, and its start lies as long before the record as that could be: give start="
         )
     return {name: extra[row].value for name, row in known.items()}
+
+
+def _of_fit(problem: Windows, found: Any) -> bool:
+    """Return whether the readings of a fit, in this session, are those of this record: another begins elsewhere."""
+    try:
+        fitted = found.residuals
+    except (AttributeError, ValueError):
+        return False
+    runs, quantities = (fitted[name].attrs["flag_meanings"].split() for name in ("run", "quantity"))
+    (record,) = problem.records
+    name, known = record.name.replace(" ", "_"), [quantities.index(q) for q in problem.sensors if q in quantities]
+    run = runs.index(name) if name in runs else 0 if len(runs) == 1 else -1
+    mine = (fitted["run"].values == run) & np.isin(fitted["quantity"].values, known)
+    read = fitted["time"].values + 1j * fitted["measured"].values  # each reading as one number
+    return bool(mine.any() and np.isin(read[mine], record.time[:, None] + 1j * record.values).all())
 
 
 def _row_of(state: str, run: str, extra: Mapping[str, Any]) -> str:

@@ -100,6 +100,11 @@ class Grown(Stage):
         """Return whether one window holds each record."""
         return len(self.problem.pieces) == len(self.problem.records)
 
+    @property
+    def length(self) -> float:
+        """The median length of its windows."""
+        return float(np.median([window.time[-1] - window.time[0] for window in self.problem.pieces]))
+
     def loose(self, state: Residuals) -> FloatArray:
         """Directions of the unknowns that readings and priors leave open; the starts' own wide prior tells nothing."""
         read, *_ = reduced(self.problem, state, self.problem.weights(state, starts=False))

@@ -242,7 +242,7 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         notes = [f"one window for each of {records} records" if records > 1 else "one window over the whole record"]
     else:
         notes = [
-            f"{n} windows of about {_length(grown):.4g}, each with its own start: over longer ones the motion is not "
+            f"{n} windows of about {grown.length:.4g}, each with its own start: over longer ones the motion is not "
             "followed"
         ]
     for c in range(len(problem.sensors)):
@@ -295,10 +295,6 @@ def _of_inputs(grown: Grown, run: int) -> list[str]:
                 "whether both count time from one instant, in one unit"
             )
     return notes
-
-
-def _length(grown: Grown) -> float:
-    return np.median([window.time[-1] - window.time[0] for window in grown.problem.pieces])
 
 
 def _of_readings(grown: Grown, c: int, data: xr.Dataset) -> list[str]:
@@ -391,7 +387,7 @@ def _anomalies(grown: Grown, data: xr.Dataset | None) -> list[str]:
         )
     if grown.stuck:
         found.append(
-            f"the model follows this record over windows of {_length(grown):.3g} only, though neighbouring motions do "
+            f"the model follows this record over windows of {grown.length:.3g} only, though neighbouring motions do "
             "not separate faster: it does not describe the record over longer times, or another first guess does"
         )
     if grown.short > SHORT:

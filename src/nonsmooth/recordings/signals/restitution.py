@@ -51,13 +51,14 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     """
     t, z = signal(time, height, least=12, purpose="finding flights")
     step = 1.0 / even_rate(t, height, "finding flights")
-    lag = 1
-    while True:
-        free, told = _falling(z, step, lag, threshold, least)
-        rows = [(a, b - 1) for a, b in runs_of(free) if b - a >= least]
-        if (told and rows) or 8 * lag > len(z):
+    lag, rows = 1, list[tuple[int, int]]()
+    for span in _spans(len(z)):
+        free, sure = _falling(z, step, span, threshold, least)
+        seen = [(a, b - 1) for a, b in runs_of(free) if b - a >= least]
+        if seen and (sure or not rows):  # where noise hides flights at any span, what the shortest shows
+            lag, rows = span, seen
+        if seen and sure:
             break
-        lag += 1
     if not rows:
         raise ValueError(
             f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
@@ -81,6 +82,14 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
             "noise": labelled((), noise, "standard deviation of a sample"),
         }
     )
+
+
+def _spans(n: int) -> Iterator[int]:
+    """Spans of second differences of a record of n samples: each longer by a quarter, up to an eighth of it."""
+    span = 1
+    while span == 1 or 8 * span <= n:
+        yield span
+        span += 1 + span // 4
 
 
 def _falling(z: FloatArray, step: float, lag: int, threshold: float, least: int) -> tuple[NDArray[np.bool_], bool]:
