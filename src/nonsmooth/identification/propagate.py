@@ -84,7 +84,8 @@ def propagate(
     Returns
     -------
     xarray.Dataset
-        The result at the parameters found, and for each variable ``x`` with numbers ``x_quantiles`` over ``quantile``;
+        The result at the parameters found, and for each variable ``x`` with numbers (and ``amplitude``, half of
+        maximum less minimum) ``x_quantiles`` over ``quantile``, whose band ``nonsmooth.plot`` draws;
         where some draws have no value, ``x_share`` says how many have. Of a run these are values at its own instants:
         give ``duration=`` and ``samples=``, so that every draw has them. For period numbers
         ``period_number_probability`` over ``period_value`` (0: none found; a draw that diverged has no number), for

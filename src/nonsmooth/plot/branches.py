@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from nonsmooth.arrays import FloatArray, IntArray
-from nonsmooth.plot import style
+from nonsmooth.plot import bands, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.labels import words_of_flags
@@ -83,7 +83,7 @@ def branch(
     Parameters
     ----------
     result
-        A ``continue_orbit`` or ``continue_equilibrium``.
+        A ``continue_orbit`` or ``continue_equilibrium``; with the bands of ``propagate`` where it has them.
     ax
         Where to draw; a new one-column figure if None.
     y
@@ -132,7 +132,13 @@ def draw_branch(
         for row in ordinates:
             label = style.once(ax, f"{_STATES[line]} branch")
             style.line(ax, with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
+    ends = bands.ends_of(result)
+    for rows in zip(*(ordinates_of(one, name, quantity) for one in ends), strict=True):
+        bands.fill(ax, result, values, *rows, color=shade)
     if special and result.sizes.get("special", 0):
+        heights = ordinates[:, result["special_point"].values.astype(int)]
+        if ends:
+            bands.bars(ax, ends, heights)
         _mark_special(ax, result, values, ordinates)
     return name
 
@@ -149,7 +155,7 @@ def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> FloatArray:
     if "eigenvalues" in result:
         rest = result["u"].sel(state=name).values.astype(float)
         return np.zeros((1, len(rest))) if quantity == "amplitude" else rest[None, :]
-    if quantity == "amplitude":
+    if quantity == "amplitude" and quantity not in result:
         chosen = 0.5 * (result["maximum"] - result["minimum"]).sel(state=name)
     else:
         source = "returns" if quantity == "section" and "returns" in result else quantity

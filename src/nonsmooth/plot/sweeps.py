@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.plot import style
+from nonsmooth.plot import bands, style
 from nonsmooth.plot.branches import check_axis, draw_branch
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
@@ -75,19 +75,17 @@ def bifurcation(
     parameter = str(result["status"].dims[0])
     for branch in over:
         check_axis(branch, parameter)
-    of_state = name in result["state"].values
-    if of_state:
+    if name in result["state"].values:
         points = column(result, "section", name)
     else:
         points = quantity_of(result, name, also=result["state"].values.tolist()).expand_dims("iterate")
-    size = size if of_state else 3.0 * size
+        size *= 3.0
     directions = dict(by_direction(result, points))
     for direction, mine in directions.items():
         under = direction == "up" and "down" in directions
         shade = color or (style.COLORS["pale"] if under else LOOKS[direction]["color"])
-        words = direction if len(directions) > 1 else None
         cloud = result[parameter].values, mine.transpose(..., parameter).values
-        style.cloud(ax, cloud, size * (_SEAM if under else 1.0), shade, words)
+        style.cloud(ax, cloud, size * (_SEAM if under else 1.0), shade, direction if len(directions) > 1 else None)
     for k, one in enumerate(over):
         draw_branch(ax, one, y=name, color=style.nth(k, _LINES), behind=True)
     _whole(ax, result[parameter].values)
@@ -197,15 +195,13 @@ def frequency_response(
     Parameters
     ----------
     result
-        What ``frequency_response`` gave.
+        A ``frequency_response``; with the bands of ``propagate`` where it has them.
     *over
-        Branches of ``continue_orbit`` over the same parameter: stable parts as a pale seam under the response, unstable
-        ones dashed, special points marked. Axes to draw on may stand here too, as in the other plots.
+        Branches of ``continue_orbit`` over the same parameter, as :func:`bifurcation` draws them.
     ax
         Where to draw; a new one-column figure if None.
     y
-        The state or the output; by default the first state. Or a quantity of each point, such as a load
-        (``"stop_energy"``).
+        The state or the output; by default the first state. Or a quantity of each point: a load (``"stop_energy"``).
     quantity
         ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"`` of a state or an output.
     jumps
@@ -216,20 +212,24 @@ def frequency_response(
         direction and from every start, are shaded.
     """
     (name,) = first_states(result, y)
-    parameter = str(result["status"].dims[0])
+    parameter, known = str(result["status"].dims[0]), quantities_of(result)
     values = result[parameter].values
-    known = quantities_of(result)
     alone = f"{name}_{quantity}" not in known
     ranges = [one.removesuffix("_amplitude") for one in known if one.endswith("_amplitude")]
-    heights = quantity_of(result, name if alone else f"{name}_{quantity}", known, also=ranges)
+    drawn = name if alone else f"{name}_{quantity}"
+    heights = quantity_of(result, drawn, known, also=ranges)
+    ends = (quantity_of(one, drawn) for one in bands.ends_of(result))
+    arrays = [dict(by_direction(result, one)) for one in (heights, *ends)]
     inside = held(result, region)
     jumping = result["state"].values.tolist() if alone else [name]
     for branch in over:
         check_axis(branch, parameter)
-    marks: list[Any] = []
-    for direction, one in by_direction(result, heights):
-        curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
-        for k, curve in enumerate(curves.T):
+    marks = []
+    for direction in arrays[0]:
+        alike = (one[direction].transpose(parameter, ...).values.reshape(len(values), -1).T for one in arrays)
+        for k, (curve, *band) in enumerate(zip(*alike, strict=True)):
+            if band:
+                bands.fill(ax, result, values, *band, color=LOOKS[direction]["color"])
             found = _intervals(values, curve, _jumps(result, jumping, direction, k))
             at = [i for _, i in found]
             broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import unknown
-from nonsmooth.plot import style
+from nonsmooth.plot import bands, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
     Name,
@@ -49,10 +49,15 @@ def time_history(ax: Axes, result: xr.Dataset, *, y: Name | None = None, shade: 
 
     The curve is cut where a reset makes the state jump. ``shade`` marks the time spent in any mode but the first; of a
     system with several elements the time in which a contact is closed (without contacts: in which something sticks).
-    The name of an element, ``"stop"``: the time in which it does something else than in the first mode.
+    The name of an element, ``"stop"``: the time in which it does something else than in the first mode. Of a result of
+    ``propagate`` the band is filled.
     """
     (name,) = first_states(result, y)
     time = result["time"].values
+    if ends := bands.ends_of(result):
+        curves = with_gaps(result, time, *(column(one, "u", name).values for one in ends))
+        bands.fill(ax, result, *curves, color=style.COLORS["first"])
+        ax.legend()
     ax.plot(*with_gaps(result, time, column(result, "u", name).values), color=style.COLORS["first"])
     if shade:
         style.shade(ax, time, _away(result, shade))
