@@ -797,6 +797,26 @@ def test_a_message_quotes_little_of_what_was_given(typed: str, nothing_compiled:
     assert len(str(raised.value)) < 1000
 
 
+def test_a_ball_in_micrometres_is_told_its_scale() -> None:
+    """At 0.1 m rounding of the place lets the ball up faster than the least speed of an impact; nothing is wrong with
+    its reset. With the scales of the message it comes to rest."""
+    fall = {"duration": 1.0, "start": {"q": 1e5}}
+
+    def ball(scale: dict[str, float] | None) -> ns.System:
+        table = ns.elements.Stop(at="q", position=-1e5, side=-1, restitution=0.5)
+        load = {"q": lambda t, p: -9.81e6}
+        return ns.mechanical(
+            1.0, 0.0, 0.0, coordinates=["q"], scale=scale, elements={"table": table}, forcing=load, parameters={}
+        )
+
+    with pytest.raises(ns.SolveError, match="Impacts are told from rest by the scales of the states") as raised:
+        ns.simulate(ball(None), **fall)
+    given = eval(str(raised.value).partition("scale=")[2].partition("}")[0] + "}")
+    assert given == {"q": 1e5, "v_q": pytest.approx(np.sqrt(4 * 9.81e6 * 1e5), rel=0.05)}
+    assert str(ns.simulate(ball(given), **fall)["mode"].attrs["flag_meanings"]).split()[1] == "table_rest"
+    assert int(ns.simulate(ball(given), **fall)["mode"][-1]) == 1
+
+
 @pytest.mark.parametrize(("sign", "e"), [(1, 0.8), (-1, 0.8), (1, 0.02)])
 @pytest.mark.parametrize("method", ["exact", "taylor"])
 def test_a_reset_with_the_wrong_sign(method: str, sign: int, e: float) -> None:

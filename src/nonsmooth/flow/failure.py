@@ -114,8 +114,8 @@ def _not_unique(system: System, jump: TracedTransition) -> str:
 
 
 def wrong_way(system: System, log: TrajectoryLog) -> str:
-    """A sentence where the last reset of a failed run left the state on its way on through the surface, or where
-    sliding had no unique way on; else nothing.
+    """A sentence where the last reset of a failed run left the state on its way on through the surface, where sliding
+    had no unique way on, or where states are so large that impacts are not told from rest; else nothing.
 
     An impact turns the rate of its indicator round. With the wrong sign it does not, and follows itself without end.
     """
@@ -130,20 +130,30 @@ def wrong_way(system: System, log: TrajectoryLog) -> str:
     if jump.reset is None or jump.source != jump.target:
         return ""
     ends = np.array([log.u_before[-1], log.u_after[-1]])
-    for row in jump.rows:
-        rate = numeric(t, (system.derivatives.lie(row.indicator, jump.source, 1),))
-        found = rate(system.parameter_vector(), log.crossing_time[-1], ends, log.memory_after[-1])
-        before, after = row.sign * found[:, 0]
-        if before > 0.0 and after > 1e-6 * before:
-            name = system.indicators[row.indicator]
-            return (
-                f"The reset of {jump.label} leaves the state on its way on through the surface: d({name})/dt is "
-                f"{row.sign * before:.4g} before it and {row.sign * after:.4g} after it. Give the velocity that it "
-                "returns the other sign; a push that leads on through its surface takes two modes, one on each side."
-            )
+    rates = numeric(t, tuple(system.derivatives.lie(row.indicator, jump.source, 1) for row in jump.rows))
+    found = rates(system.parameter_vector(), log.crossing_time[-1], ends, log.memory_after[-1])
+    before, after = found * [row.sign for row in jump.rows]
+    on = (before > 0.0) & (after > 1e-6 * before)
+    if on.any() and not ((before > 0.0) & ~on).any():  # a condition beside the one that is turned round may go on
+        k = int(on.argmax())
+        return (
+            f"The reset of {jump.label} leaves the state on its way on through the surface: "
+            f"d({system.indicators[jump.rows[k].indicator]})/dt is {found[0, k]:.4g} before it and {found[1, k]:.4g} "
+            "after it. Give the velocity that it returns the other sign; a push that leads on through its surface "
+            "takes two modes, one on each side."
+        )
+    largest = np.nanmax(np.abs(np.concatenate([log.u_before, log.u_after])), axis=0)
+    states = zip(system.states, largest, system.scale_vector(), strict=True)
+    large = {name: float(f"{u:.2g}") for name, u, scale in states if u > LARGE * scale}
+    if large and meter_of(system) is not None:
+        return (
+            "Impacts are told from rest by the scales of the states, 1 where none is given. These states are more than "
+            f"{LARGE:g} times as large: give scale={large}."
+        )
     return ""
 
 
+LARGE = 100.0  # units of its scale: rounding of such a state is seen beside the least speed of an impact
 LEAST = 1e-3  # the least size of a motion, in units of the states' scales
 RESTING = 5e-7  # in the same units: a smaller state is rounding beside a motion
 NOTHING = 1e-15  # and where nothing moves more

@@ -137,7 +137,7 @@ STATUSES: tuple[Status, ...] = (
     Status(
         codes.TOO_MANY_CROSSINGS,
         "too_many_crossings",
-        "More than 1000 transitions took place within one section return.",
+        "More than 50 000 transitions took place within one section return, period or unit of time.",
         "Check that a transition does not lead straight back to where it came from, or use a section met more often.",
     ),
     Status(

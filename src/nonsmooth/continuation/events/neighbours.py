@@ -38,6 +38,7 @@ STEPS = (1e-6, 1e-7, 1e-8)  # along a branch, each way: to the boundary beside w
 JUMP = 1e-6  # of the orbit's size: as far it jumps where an impact becomes slow enough to be completed as rest
 ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same
 AGAIN = 3  # times that Newton's method is begun with one signature
+MOST = 2000  # visits of a signature that is tried: Newton's method on more takes minutes
 
 
 def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[OrbitPoint] = ()) -> OrbitPoint | None:
@@ -96,7 +97,7 @@ def _found(point: OrbitPoint, common: list[Common], side: float, aside: float) -
     tried -= Counter({other.shooting.signature.cycle: AGAIN for other, _, _ in common})
     for guess in _guesses(point, common, values, side * aside):
         for _ in range(ROUNDS):
-            if guess is None or tried[guess.signature.cycle] >= AGAIN:
+            if guess is None or len(guess.times) > MOST or tried[guess.signature.cycle] >= AGAIN:
                 break
             tried[guess.signature.cycle] += 1
             other, X = curve.around(guess, there)

@@ -18,6 +18,7 @@ from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting, Solved, plane_across
 from nonsmooth.continuation.problems.signature import Round, Signature
 from nonsmooth.flow.loads import within_held
+from nonsmooth.results.memory import room_for
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -103,6 +104,8 @@ class Orbits(Curve[OrbitPoint]):
     def __init__(self, shooting: Shooting, size: FloatArray, period: float, widths: Sequence[float]) -> None:
         self.shooting, self.walk = shooting, Walk(shooting)
         m, self.first_size = shooting.m, size  # the size of the branch's first orbit
+        remedy = "raise the creep of a stop, below which impacts end in rest, or take another orbit"
+        room_for(24.0 * shooting.size**2, f"Newton's method on an orbit with {m} transitions", remedy)
         self.size, self.period, self.widths = size, period, tuple(widths)
         scale = shooting.join(np.full(m, period), np.tile(size, (m + 1, 1)), period, widths)
         # The length of a curve should not depend on how many visits an orbit is cut into.

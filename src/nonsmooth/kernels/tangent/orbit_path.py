@@ -6,7 +6,7 @@ margin rises through zero. A local maximum of the margin below zero is a touch t
 path has gone through a boundary that it should have obeyed.
 """
 
-from math import fabs, inf
+from math import exp, fabs, inf
 from math import log as ln
 from typing import Any, NamedTuple
 
@@ -25,6 +25,7 @@ ROUNDING = 1e-13  # of an indicator's size
 BEGUN = 1e-6  # of a step: the square root of rounding
 STILL = 1e-9  # of a slope's terms: an orbit is solved for no better, and where motion turns the slope is zero
 MOST_STEPS = 100_000
+FIRST = 4  # terms of a row by which its size is told
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _i1, _i2 = _f[::1], _f[:, ::1], _i[::1], _i[:, ::1]
@@ -76,6 +77,22 @@ def still(C, m, row, slope, h):
         size = max(size, p * fabs(C[row, p]) * power)
         power *= h
     return fabs(slope) < STILL * size
+
+
+@device
+def reach_of(C, m, first, log_rtol):
+    """The time over which rows from ``first`` on are told: their last two terms are rtol of one of the first, whatever
+    the scale of a row; inf: constants."""
+    power = inf
+    for i in range(first, C.shape[0]):
+        for last in range(m - 1, m + 1):
+            most = -inf
+            for k in range(FIRST):
+                if C[i, k] != 0.0 and C[i, last] != 0.0:
+                    most = max(most, (log_rtol + ln(fabs(C[i, k] / C[i, last]))) / (last - k))
+            if most > -inf:
+                power = min(power, most)
+    return inf if power > 300.0 else exp(power)
 
 
 @device
@@ -154,8 +171,10 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
             if left <= 0.0 and (steps > 0 or left < 0.0):
                 break
             jet(mode, order, t, u, q, C, W)
-            # An indicator is zero where a visit begins: its size says nothing, the states decide alone.
-            reach = step_length(C, order, n, 0, u, weight, scale, log_rtol)
+            # An indicator is zero where a visit begins, so its size says nothing; where a mass sticks it alone moves.
+            reach = min(step_length(C, order, n, 0, u, weight, scale, log_rtol), reach_of(C, order, n, log_rtol))
+            if reach == inf:
+                reach = max(left, 0.0)
             h = min(reach, left)
             if not (h >= 0.0):
                 return DIVERGED
