@@ -324,10 +324,8 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, end: Met | Non
         sides.insert(0 if _is_better(met[0], end.point) else 1, end)
     kind, point = sides[0].kind, sides[0].point
     own = [change.indicator for side in sides for change in side.kind.contacts(side.point)]
-    every = own or [side.kind.surface(side.point, beyond) for side in sides]
-    indicator = min((one for one in every if one >= 0), default=-1)  # of a corner's two the same one in any units
-    told = [side.kind.name for side in sides if side.kind.place >= 0] or [kind.name]
-    touches = sliding in TOUCHES if sliding else own or "grazing" in told
+    indicator = own[0] if own else kind.surface(point, beyond)
+    touches = sliding in TOUCHES if sliding else own or kind.name == "grazing"
     name = name or ("grazing" if touches else "corner")
     if name == "grazing":  # the orbit without the contact
         point = min((side.point for side in sides), key=lambda one: one.shooting.m)
