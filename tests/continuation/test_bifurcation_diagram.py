@@ -62,7 +62,7 @@ def diagram_of(figure: str) -> xr.Dataset:
 
 
 @pytest.mark.parametrize(
-    "figure", ["9", "13", *(pytest.param(one, marks=pytest.mark.slow) for one in ("10", "11", "17"))]
+    "figure", ["13", *(pytest.param(one, marks=pytest.mark.slow) for one in ("9", "10", "11", "17"))]
 )
 def test_figures_of_the_paper(figure: str) -> None:
     parameters, name, limits, kinds, values = FIGURES[figure]
@@ -95,9 +95,6 @@ def test_figures_of_the_paper(figure: str) -> None:
 def test_cascade_down_to_period_eight(tmp_path: Path) -> None:
     """Fig. 13: periods 1, 2, 4, 8 one from the other; the diagram is saved, read, drawn and gone on from."""
     diagram = diagram_of("13")
-    begun = time.process_time()  # all is compiled now
-    assert diagram_of.__wrapped__("13").identical(diagram)
-    assert time.process_time() - begun < 5.0
     assert diagram["period_number"].values.tolist() == [1, 2, 4, 8]
     assert diagram["parent"].values.tolist() == [-1, 0, 1, 2]
     assert all(one.attrs["long_name"] for one in diagram.data_vars.values())
@@ -121,6 +118,14 @@ def test_cascade_down_to_period_eight(tmp_path: Path) -> None:
     assert words == ["sweeps", "stable branch", "unstable branch", "flip"]
 
 
+@pytest.mark.slow
+def test_a_diagram_takes_seconds_and_is_the_same_again() -> None:
+    diagram = diagram_of("13")
+    begun = time.process_time()  # all is compiled now
+    assert diagram_of.__wrapped__("13").identical(diagram)
+    assert time.process_time() - begun < 5.0
+
+
 def test_what_is_refused() -> None:
     with pytest.raises(ValueError, match="has no forcing: follow its equilibria"):
         ns.bifurcation_diagram(ns.models.relief_valve(q=9.0), "q", (5.0, 10.0))
@@ -131,7 +136,10 @@ def test_what_is_refused() -> None:
 def test_a_bubble_of_period_doubling_is_one_branch_from_flip_to_flip() -> None:
     """x' = a - x^2 has period 2 where a > 3/4 and period 4 from 5/4 on: with a = 1 - mu^2 from mu = -1/2 to 1/2."""
     hump = ns.Map(states=["x"], parameters={"mu": 0.0}, branches=[ns.Branch(lambda u, p: (1.0 - p.mu**2 - u.x**2,))])
-    found = ns.bifurcation_diagram(hump, "mu", (-0.9, 0.8), n=21, transient=50, progress=False)
+    found, again = (
+        ns.bifurcation_diagram(hump, "mu", (-0.9, 0.8), n=21, transient=50, progress=False) for _ in range(2)
+    )
+    assert again.identical(found)
     assert found["period_number"].values.tolist() == [1, 2]
     assert found["special_kind"].values.tolist() == ["flip"] * 4
     assert sorted(found["special_value"].values) == pytest.approx([-0.5, -0.5, 0.5, 0.5], abs=1e-9)
@@ -157,7 +165,7 @@ def test_periods_1_2_and_4_of_a_wall_with_rest_come_from_one_graze() -> None:
         parameters={"w": 1.45},
         elements={"wall": ns.elements.Stop(at="q", position=gap, restitution=0.2)},
     )
-    found = ns.bifurcation_diagram(system, "w", (1.4, 1.5), n=40, transient=150, depth=2, max_period=4, progress=False)
+    found = ns.bifurcation_diagram(system, "w", (1.4, 1.5), n=8, transient=150, depth=2, max_period=4, progress=False)
     assert found["period_number"].values[:3].tolist() == [1, 2, 4] and int(found["complete"])
     amplitude = F / (gap + load / k)  # (k - x)^2 + c^2 x = amplitude^2, x = w^2
     touched = np.sqrt(np.roots([1.0, c * c - 2 * k, k * k - amplitude**2]).min())
@@ -167,6 +175,46 @@ def test_periods_1_2_and_4_of_a_wall_with_rest_come_from_one_graze() -> None:
         assert np.abs(grazes - touched).min() < 1e-9
 
 
+def test_every_branch_has_its_modes_where_elements_decide_together(tmp_path: Path) -> None:
+    """Modes and transitions are numbered as they are found, and each branch found its own: its orbits come back in a
+    simulation from the mode that stands there, and the flip leads on."""
+    stop = ns.elements.Stop
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        coordinates=["x"],
+        forcing={"x": lambda t, p: np.cos(p.w * t)},
+        parameters={"w": 1.85},
+        elements={
+            "stop": stop(at="x", position=0.2, restitution=0.7),
+            "low": stop(at="x", side=-1, position=-0.9, restitution=0.6),
+            "rub": ns.elements.Coulomb(at="x", friction=0.05),
+        },
+        impacts="sequential",
+    )
+    whole = ns.bifurcation_diagram(
+        system, "w", (1.75, 1.85), n=4, depth=1, max_period=4, points=60, transient=200, progress=False
+    )
+    found = ns.load(ns.save(whole, tmp_path / "diagram.nc"))
+    assert found["period_number"].values.tolist() == [1, 2]
+    names = found["mode"].attrs["flag_meanings"].split()
+    for k in (0, 1):
+        on = np.flatnonzero(found["branch"].values == k)
+        for i in on[:: max(len(on) // 4, 1)]:
+            point = found.isel(point=int(i))
+            run = ns.simulate(
+                system.with_parameters(w=float(point["w"])),
+                duration=float(point["period"]),
+                start=point["section"].values,
+                mode=names[int(point["mode"])],
+            )
+            assert run["u"].values[-1] == pytest.approx(point["section"].values, abs=1e-8)
+    flip = ns.special_points(found).isel(special=0)
+    assert int(ns.continue_orbit(flip, "w", (1.81, 1.82), points=8)["period_number"]) == 2
+
+
+@pytest.mark.slow
 def test_flips_of_all_branches_lead_on_where_elements_decide_together(tmp_path: Path) -> None:
     """Modes and transitions are numbered as they are found, and each branch found its own: orbits of twice the period
     come back in a simulation, from flips of branches that leave others too."""
@@ -228,10 +276,10 @@ def test_an_orbit_is_passed_once_whichever_forcing_period_its_section_lies_in() 
         },
     )
     orbit = ns.find_orbit(system, start=[0.9038, 0.80097, 2.5446, 2.095], transient=0, period_number=2)
-    doubled = ns.special_points(ns.continue_orbit(orbit, "w", (0.64393, 0.8712)))
+    doubled = ns.special_points(ns.continue_orbit(orbit, "w", (0.8465, 0.848)))
     at = {kind: doubled["w"].values[doubled["kind"].values == kind] for kind in ("flip", "grazing")}
     row = doubled.isel(special=int(np.flatnonzero(doubled["w"].values == at["flip"].min())[0]))
-    special = ns.special_points(ns.continue_orbit(row, "w", (0.64393, 0.8712)))
+    special = ns.special_points(ns.continue_orbit(row, "w", (0.8465, 0.848)))
     inner = special["w"].values[np.abs(special["w"].values - at["grazing"].min()) > 1e-10]
     assert np.diff(np.sort(inner)).min() > 1e-9
     assert np.abs(special["w"].values - at["grazing"].min()).min() < 1e-9

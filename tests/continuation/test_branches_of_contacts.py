@@ -75,7 +75,11 @@ def test_a_branch_is_that_of_a_sweep() -> None:
         assert branch["section"].values[i] == pytest.approx(run["u"].values[0], abs=1e-8)
 
 
-def test_frictions_of_one_coordinate_are_their_sum() -> None:
+@pytest.mark.parametrize(
+    ("frictions", "high"),
+    [([(0.1, 0.1, 0.14)], 1.05), pytest.param([(0.25, 0.09), (0.1, 0.1, 0.14)], 1.1, marks=pytest.mark.slow)],
+)
+def test_frictions_of_one_coordinate_are_their_sum(frictions: list[tuple[float, ...]], high: float) -> None:
     """Two or three frictions on a mass turn at one instant: orbit, multipliers and branch are those of one friction."""
 
     def branch(*friction: float) -> xr.Dataset:
@@ -88,10 +92,10 @@ def test_frictions_of_one_coordinate_are_their_sum() -> None:
             forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
             elements={**rubs, "other": ns.elements.Coulomb(at="q1", friction=0.29)},
         )
-        return ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (1.0, 1.1))
+        return ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (1.0, high))
 
     one = branch(0.34)
-    for friction in ((0.25, 0.09), (0.1, 0.1, 0.14)):
+    for friction in frictions:
         several = branch(*friction)
         assert several.sizes["special"] == one.sizes["special"] == 0
         assert several["ended_because"].values.tolist() == one["ended_because"].values.tolist()
@@ -129,12 +133,15 @@ def test_a_speed_that_was_held_is_zero_where_the_block_leaves_its_belt() -> None
             "two": ns.elements.Backlash(at="x", half_width=0.113, stiffness=6.988, damping=0.291),
         },
     )
-    branch = ns.continue_orbit(ns.find_orbit(system.with_parameters(A=0.6), progress=False), "A", (0.55, 0.62))
+    branch = ns.continue_orbit(ns.find_orbit(system.with_parameters(A=0.57), progress=False), "A", (0.56, 0.575))
     assert branch["ended"].values.tolist() == [0, 0]
 
 
 @pytest.mark.physics
-def test_stops_out_of_reach_change_nothing() -> None:
+@pytest.mark.parametrize(
+    ("begun", "ends"), [(0.355, (0.34, 0.36)), pytest.param(0.42, (0.33, 0.45), marks=pytest.mark.slow)]
+)
+def test_stops_out_of_reach_change_nothing(begun: float, ends: tuple[float, float]) -> None:
     """Two masses, one of them with friction: its sliding bifurcations are those beside stops that are never met, with
     which modes are made when they are visited."""
 
@@ -144,25 +151,32 @@ def test_stops_out_of_reach_change_nothing() -> None:
             np.eye(2),
             0.1 * np.eye(2),
             [[2.0, -1.0], [-1.0, 2.5]],
-            parameters={"w": 0.42},
+            parameters={"w": begun},
             coordinates=["a", "b"],
             forcing={"a": lambda t, p: np.cos(p.w * t)},
             elements={"rub": ns.elements.Coulomb(at="a", friction=0.05), **walls},
         )
-        return ns.special_points(ns.continue_orbit(ns.find_orbit(system, transient=300), "w", (0.33, 0.45)))
+        return ns.special_points(ns.continue_orbit(ns.find_orbit(system, transient=300), "w", ends))
 
     alone, beside = special(), special(1, -1)
     names = ["grazing_sliding", "adding_sliding", "switching_sliding", "grazing_sliding"]
-    assert beside["sliding"].values.tolist() == alone["sliding"].values.tolist() == names
-    assert (
-        beside["kind"].values.tolist() == alone["kind"].values.tolist() == ["grazing", "grazing", "corner", "grazing"]
-    )
+    kinds = ["grazing", "grazing", "corner", "grazing"]
+    many = 2 if ends[1] < 0.39 else 4
+    assert beside["sliding"].values.tolist() == alone["sliding"].values.tolist() == names[:many]
+    assert beside["kind"].values.tolist() == alone["kind"].values.tolist() == kinds[:many]
     np.testing.assert_allclose(beside["w"], alone["w"], rtol=0, atol=1e-9)
 
 
 @pytest.mark.physics
-@pytest.mark.parametrize(("masses", "at"), [(1, 0.5), (2, 0.4)])
-def test_a_soft_stop_flush_with_a_wall_is_never_pressed(masses: int, at: float) -> None:
+@pytest.mark.parametrize(
+    ("masses", "at", "ends"),
+    [
+        (2, 0.4, (1.09, 1.11)),
+        pytest.param(1, 0.5, (0.8, 1.0), marks=pytest.mark.slow),
+        pytest.param(2, 0.4, (1.07, 1.13), marks=pytest.mark.slow),
+    ],
+)
+def test_a_soft_stop_flush_with_a_wall_is_never_pressed(masses: int, at: float, ends: tuple[float, float]) -> None:
     """A spring that begins where a rigid wall stands closes, is struck and opens at one instant: orbit, multipliers and
     branch are those of the wall alone."""
 
@@ -184,7 +198,7 @@ def test_a_soft_stop_flush_with_a_wall_is_never_pressed(masses: int, at: float) 
             forcing={"a": lambda t, p: np.cos(p.w * t)},
             elements=elements,
         )
-        return ns.continue_orbit(ns.find_orbit(system, transient=300), "w", (0.8, 1.0) if masses == 1 else (1.07, 1.13))
+        return ns.continue_orbit(ns.find_orbit(system, transient=300), "w", ends)
 
     alone, flush = branch(), branch(at)
     assert flush["ended_because"].values.tolist() == alone["ended_because"].values.tolist()
@@ -198,18 +212,23 @@ def test_a_soft_stop_flush_with_a_wall_is_never_pressed(masses: int, at: float) 
 
 @pytest.mark.physics
 @pytest.mark.parametrize(
-    "rest",
+    ("rest", "ends"),
     [
-        pytest.param("gap < 0 and closing < 0 and slow > 0", marks=pytest.mark.slow),
-        "closing < 0 and slow > 0 and gap < 0",
+        ("closing < 0 and slow > 0 and gap < 0", (0.393, 0.3945)),
+        *(
+            pytest.param(rest, (0.34, 0.4), marks=pytest.mark.slow)
+            for rest in ("gap < 0 and closing < 0 and slow > 0", "closing < 0 and slow > 0 and gap < 0")
+        ),
     ],
 )
-def test_how_many_impacts_come_before_rest_is_no_special_point_in_any_order_of_conditions(rest: str) -> None:
+def test_how_many_impacts_come_before_rest_is_no_special_point_in_any_order_of_conditions(
+    rest: str, ends: tuple[float, float]
+) -> None:
     """Of a mass that bounces to rest on a wall, written as modes: below a speed of 1e-7 an impact is completed as rest,
     and their number changes along the branch; the motion does not."""
     system = ns.System(
         states={"q": "1", "v": "1"},
-        parameters={"w": 0.35},
+        parameters={"w": 0.3935},
         modes={
             "flight": lambda t, u, p: (u.v, np.cos(p.w * t) - 0.1 * u.v - u.q),
             "rest": lambda t, u, p: (0.0 * u.q, 0.0 * u.v),
@@ -227,8 +246,8 @@ def test_how_many_impacts_come_before_rest_is_no_special_point_in_any_order_of_c
         ],
     )
     orbit = ns.find_orbit(system, transient=60, start={"q": 0.0, "v": 0.0})
-    branch = ns.continue_orbit(orbit, "w", (0.34, 0.4))
-    assert [branch["w"].values.min(), branch["w"].values.max()] == pytest.approx([0.34, 0.4])
+    branch = ns.continue_orbit(orbit, "w", ends)
+    assert [branch["w"].values.min(), branch["w"].values.max()] == pytest.approx(ends)
     assert len(np.unique(branch["crossings_per_period"])) > 1 and branch.sizes["special"] == 0
 
 

@@ -45,6 +45,7 @@ def test_lift_off_that_is_only_solved_for_is_no_graze() -> None:
         assert not np.isfinite(path.inner[lifts, 2]), early
 
 
+@pytest.mark.slow
 def test_beyond_the_end_of_rest_every_distance_has_another_signature() -> None:
     """Impacts accumulate there: orbits beyond come nearer in proportion, each with another count of them."""
     followed("rest", 3, 1.54, 1.5821424, a=1.56)
@@ -66,12 +67,12 @@ def test_flights_do_not_take_their_other_root() -> None:
 
 def test_impacts_as_slow_as_they_are_followed() -> None:
     """The speed at which impacts are completed is passed where a stop at 0.9 leaves it nine digits fewer."""
-    followed("two_stops", 1, 0.74, 0.83, w=0.8)
+    followed("two_stops", 1, 0.78, 0.82, w=0.8)
 
 
 def test_two_impacts_pass_the_section_in_one_step() -> None:
     """Behind the first one the search for the second one began at its zero, and ended there again and again."""
-    followed("two_stops", 2, 0.57, 0.6, w=0.59)
+    followed("two_stops", 2, 0.58, 0.585, w=0.583)
 
 
 def test_the_number_of_impacts_before_rest_is_no_event() -> None:
@@ -85,7 +86,7 @@ def test_the_number_of_impacts_before_rest_is_no_event() -> None:
         forcing={"q": lambda t, p: np.cos(p.w * t)},
         elements={"stop": ns.elements.Stop(at="q", position=0.3, restitution="r", creep=1e-7)},
     )
-    branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "r", (0.48, 0.52))
+    branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "r", (0.495, 0.505))
     assert endings(branch) == ["range", "range"]
     assert branch.sizes["special"] == 0
     assert (np.diff(branch["r"].values) > 0.0).all()

@@ -30,7 +30,7 @@ def figure_9() -> xr.Dataset:
     return ns.continue_orbit(ns.find_orbit(system), "omega", (3.0, 7.0))
 
 
-@pytest.mark.parametrize("box", [{"omega": (0.5, 1.5), "A": (0.01, 1.0)}, {"d": (0.5, 1.5), "c": (0.02, 0.5)}])
+@pytest.mark.parametrize("box", [{"omega": (0.9, 1.2), "A": (0.01, 1.0)}, {"d": (0.5, 1.5), "c": (0.02, 0.5)}])
 def test_grazing_curve_of_the_impact_oscillator(impact: xr.Dataset, box: dict[str, Any]) -> None:
     """Test problem A: A = d sqrt((k - omega^2)^2 + (c omega)^2), to 1e-10 along the whole curve."""
     curve = ns.continue_curve(row(impact, "grazing"), box)
@@ -43,7 +43,7 @@ def test_grazing_curve_of_the_impact_oscillator(impact: xr.Dataset, box: dict[st
     assert list(curve["ended"].values) == [0, 0] and curve.sizes["point"] > 20
 
 
-@pytest.mark.parametrize(("kind", "i"), [("fold", 0), ("flip", 1)])
+@pytest.mark.parametrize(("kind", "i"), [("flip", 1), pytest.param("fold", 0, marks=pytest.mark.slow)])
 def test_curves_of_folds_and_flips_against_the_closed_form(figure_9: xr.Dataset, kind: str, i: int) -> None:
     """Points of the curve are folds and flips of the 40-digit closed form."""
     curve = ns.continue_curve(row(figure_9, kind, i), {"omega": (3.3, 6.0), "rho": (0.12, 0.16)})
@@ -65,6 +65,7 @@ def test_curves_of_folds_and_flips_against_the_closed_form(figure_9: xr.Dataset,
         assert found == pytest.approx(p["omega"], abs=1e-8)
 
 
+@pytest.mark.slow
 def test_two_folds_meet_in_a_cusp(figure_9: xr.Dataset) -> None:
     """The two folds of Fig. 9 lie on one curve; from either the same cusp is found, and beyond it there is no fold."""
     box = {"omega": (4.0, 6.5), "rho": (0.06, 0.16)}
@@ -84,12 +85,14 @@ def test_two_folds_meet_in_a_cusp(figure_9: xr.Dataset) -> None:
         assert int((ns.special_points(branch)["kind"] == "fold").sum()) == folds
 
 
-@pytest.mark.parametrize("damping", [0.2, pytest.param(0.15, marks=pytest.mark.slow)])
-def test_grazing_curve_while_its_touch_and_a_crossing_pass_the_section(damping: float) -> None:
+@pytest.mark.parametrize(
+    ("damping", "low"), [(0.2, 0.85), *(pytest.param(c, 0.55, marks=pytest.mark.slow) for c in (0.2, 0.15))]
+)
+def test_grazing_curve_while_its_touch_and_a_crossing_pass_the_section(damping: float, low: float) -> None:
     """x touches a wall, on which it may rest, for A = sqrt((1 - w^2)^2 + (0.2 w)^2), whatever a second mass does.
 
     The phases of the touch and of the second mass's crossings pass the section, and are no ends; with equal dampings
-    all multipliers have one modulus."""
+    all multipliers have one modulus. At w = 0.94 the touch passes it: there x lags by 1."""
     stops = ns.elements
     system = ns.mechanical(
         np.eye(2),
@@ -97,17 +100,17 @@ def test_grazing_curve_while_its_touch_and_a_crossing_pass_the_section(damping: 
         np.eye(2),
         coordinates=["x", "y"],
         forcing={"x": lambda t, p: p.A * np.cos(p.w * t + 1.0), "y": lambda t, p: np.cos(p.w * t + 2.2)},
-        parameters={"A": 0.3, "w": 0.6},
+        parameters={"A": 0.15, "w": low + 0.05},
         elements={
             "wall": stops.Stop(at="x", position=1.0, restitution=0.5),
             "pad": stops.ElasticStop(at="y", position=0.3, stiffness=0.5),
         },
     )
     branch = ns.continue_orbit(ns.find_orbit(system), "A", (0.1, 0.68))
-    curve = ns.continue_curve(row(branch, "grazing"), {"w": (0.55, 1.0), "A": (0.1, 2.0)}, step=0.1)
+    curve = ns.continue_curve(row(branch, "grazing"), {"w": (low, 1.0), "A": (0.1, 2.0)}, step=0.1)
     A, w = curve["A"].values, curve["w"].values
     assert np.abs(A - np.hypot(1 - w**2, 0.2 * w)).max() < 1e-10
-    assert list(curve["ended"].values) == [0, 0] and [w.min(), w.max()] == pytest.approx([0.55, 1.0])
+    assert list(curve["ended"].values) == [0, 0] and [w.min(), w.max()] == pytest.approx([low, 1.0])
 
 
 def test_fold_curve_while_an_impact_passes_the_section() -> None:

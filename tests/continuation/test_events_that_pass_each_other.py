@@ -44,7 +44,7 @@ def followed(low: float, high: float) -> tuple[list[str], xr.Dataset]:
     return [str(kind) for kind in ns.special_points(branch)["kind"].values], branch
 
 
-@pytest.mark.parametrize(("low", "high"), [(1.322, 1.323), (1.3299, 1.3303)])
+@pytest.mark.parametrize(("low", "high"), [(1.3299, 1.3303), pytest.param(1.322, 1.323, marks=pytest.mark.slow)])
 def test_a_turn_that_passes_an_impact_is_one_corner(low: float, high: float) -> None:
     """Their instants are equal there, one is first on one side and the other one on the other."""
     special, branch = followed(low, high)

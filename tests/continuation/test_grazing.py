@@ -38,7 +38,13 @@ def from_both_sides(figure: str, **more: float) -> tuple[xr.Dataset, xr.Dataset]
     return ns.continue_orbit(one, "omega", limits), ns.continue_orbit(other, "omega", limits)
 
 
-@pytest.mark.parametrize(("figure", "c_s"), [("figure 9", 0.6), ("figure 10", 0.0), ("figure 17", 0.6)])
+@pytest.mark.parametrize(
+    ("figure", "c_s"),
+    [
+        ("figure 17", 0.6),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in (("figure 9", 0.6), ("figure 10", 0.0))),
+    ],
+)
 def test_both_directions_agree(figure: str, c_s: float) -> None:
     """A contact gained or lost: special points to 1e-9, branch points to 1e-8 at equal parameters."""
     one, other = from_both_sides(figure, c_s=c_s)
@@ -77,7 +83,7 @@ def solved_at(branch: xr.Dataset, omega: float) -> list[np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize("side", ["lower", "upper"])
+@pytest.mark.parametrize("side", ["lower", pytest.param("upper", marks=pytest.mark.slow)])
 def test_multipliers_just_past_the_graze(side: str) -> None:
     """They tend to those of M- with S inserted: within 1e-2 at a depth of 1e-10 m, like the root of the depth."""
     rho, g, free, _, limits = SOFT["figure 9"]
@@ -168,7 +174,7 @@ def test_impact_oscillator_both_ways(omega: float, kind: str) -> None:
     assert [value for _, value in table(back)] == pytest.approx([value for _, value in table(free)], abs=1e-9)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.05])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_a_symmetric_motion_grazes_both_walls_all_along_its_curve(friction: float) -> None:
     """A mass midway between two walls reaches both where its amplitude is 1: F = |1 - w^2 + i c w|; with friction the
     curve of another law passes the grazes of branches."""

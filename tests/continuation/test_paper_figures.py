@@ -131,13 +131,8 @@ CASCADES: dict[str, tuple[str, Callable[[], xr.Dataset]]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "figure",
-    [
-        "figure 13",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("figure 11", "figure 17")),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("figure", CASCADES)
 def test_period_doublings(figure: str) -> None:
     """The first four flips, each on the branch that leaves the one before; the first two against the closed form."""
     name, begin = CASCADES[figure]

@@ -143,6 +143,7 @@ def test_b_symmetric_branch_is_symmetric(duffing: list[xr.Dataset]) -> None:
     assert not np.allclose(duffing[0]["maximum"], -duffing[0]["minimum"], rtol=1e-2)
 
 
+@pytest.mark.slow
 def test_b_doubled_branches_lead_from_flip_to_flip(duffing: list[xr.Dataset]) -> None:
     """The branch of twice the period that leaves one flip ends at the other one of the pair, to the last digits."""
     special = ns.special_points(duffing[0])

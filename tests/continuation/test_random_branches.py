@@ -122,6 +122,7 @@ def test_square_root_map_behind_its_border(lam: float, begun: float) -> None:
     assert special["mu"].values == pytest.approx([0.0], abs=1e-10)
 
 
+@pytest.mark.slow
 def test_mass_at_rest_on_a_table_until_impacts_accumulate() -> None:
     """The branch goes on at lift-off, and through the grazes that accumulate where rest ends, without turning back."""
     system, name, limits, start = templates.rest(np.random.default_rng([7, 4]))

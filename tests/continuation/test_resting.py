@@ -98,7 +98,7 @@ def test_dry_friction_leaves_an_interval(q: float) -> None:
 def test_friction_before_a_stop() -> None:
     """The interval meets the stop at 1 with P + mu = 2, shrinks, and is the stop itself from P - mu = 2 on."""
     system = pushed(f=E.Coulomb(at="q", friction=MU), s=E.Stop(at="q", position=1.0))
-    branch = ns.continue_equilibrium(system, "P", (-1.0, 4.0))
+    branch = ns.continue_equilibrium(system, "P", (-1.0, 4.0), step=0.2)
     whole(branch, -1.0, 4.0)
     P = branch["P"].values
     assert branch["u_upper"].values[:, 0] == pytest.approx(np.minimum((P + MU) / 2, 1.0), abs=1e-9)
@@ -139,7 +139,7 @@ def test_two_frictions_are_followed_by_their_extreme_points() -> None:
         forcing={"q1": lambda t, p: p.P},
         elements={"f": E.Coulomb(at="q1", friction=bounds[0]), "g": E.Coulomb(at="q2", friction=bounds[1])},
     )
-    branch = ns.continue_equilibrium(system, "P", (-1.0, 2.0), step=0.06)
+    branch = ns.continue_equilibrium(system, "P", (-1.0, 2.0), step=0.3)
     whole(branch, -1.0, 2.0)
     inverse = np.linalg.inv(stiffness)
     middle, half = branch["P"].values[:, None] * inverse[0], np.abs(inverse) @ bounds
@@ -159,7 +159,7 @@ def test_another_extreme_point_is_no_boundary() -> None:
         parameters={"c": -1.0},
         elements={"f": E.Coulomb(at="q1", friction=m), "g": E.Coulomb(at="q2", friction=n)},
     )
-    branch = ns.continue_equilibrium(system, "c", (-1.5, 1.5), step=0.06)
+    branch = ns.continue_equilibrium(system, "c", (-1.5, 1.5), step=0.2)
     c = branch["c"].values
     assert c[[0, -1]] == pytest.approx([-1.5, 1.5])
     assert branch["u_upper"].values[:, 0] == pytest.approx((3 * m + np.abs(c) * n) / (6 - c**2), abs=1e-9)
@@ -221,7 +221,8 @@ def test_a_mass_that_is_pulled_away() -> None:
     assert all("boundary" in str(text) for text in branch["ended_because"].values)
 
 
-@pytest.mark.parametrize("impacts", ["simultaneous", "sequential"])  # modes written out, and made when visited
+# modes written out, and made when visited
+@pytest.mark.parametrize("impacts", ["sequential", pytest.param("simultaneous", marks=pytest.mark.slow)])
 def test_friction_between_two_walls(impacts: str) -> None:
     """The ends of what friction leaves are F -+ mu, cut off by the walls: along a branch, and where sweeps and basins
     end."""
@@ -274,7 +275,7 @@ def test_equal_elements_on_other_springs() -> None:
 def test_equal_systems_number_their_modes_themselves() -> None:
     """Whatever was visited first: the ends are F -+ mu before the elastic stop, and where it closes is found."""
     found = []
-    for first in ({}, {"q": -0.9, "v_q": -2.0}, {"q": 0.9, "v_q": 3.0}):
+    for first in ({}, {"q": 0.9, "v_q": 3.0}):
         elements = {
             "friction": ns.elements.Coulomb(at="q", friction=0.2),
             "soft": ns.elements.ElasticStop(at="q", position=0.5, stiffness=2.0),
@@ -286,7 +287,7 @@ def test_equal_systems_number_their_modes_themselves() -> None:
         )
         if first:
             ns.simulate(system, duration=20.0, start=first)
-        found.append(ns.continue_equilibrium(system, "F", (-0.6, 0.6), step=0.06))
+        found.append(ns.continue_equilibrium(system, "F", (0.0, 0.6), step=0.1))
     for branch in found:
         q = branch.F.values[:, None] + np.array([-0.2, 0.2])
         ends = np.where(q > 0.5, (q + 1.0) / 3.0, q)  # q + 2 (q - 0.5) = F -+ mu

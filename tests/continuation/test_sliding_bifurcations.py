@@ -229,6 +229,7 @@ def relay_branch(parameter: str, range: tuple[float, float], **values: float) ->
     return ns.continue_orbit(orbit, parameter, range)
 
 
+@pytest.mark.slow
 def test_the_relay_s_adding_and_grazing_sliding() -> None:
     branch = relay_branch("sigma", (1.0, 2.0), xi=0.2, omega=10.0)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import nonsmooth as ns
 
 TRANSIENT = 500
 
 
+@pytest.mark.slow
 def test_section_points_of_figure_11_lie_on_the_branches() -> None:
     """Of the sweep's periodic points at least 60 % qualify: the branch's period number and crossings, and multipliers
     that have settled them, mu^transient < 1e-8."""

@@ -85,19 +85,19 @@ def test_motion_without_contact_beyond_the_support(way: str) -> None:
     assert (rows["grazing"].values == "persistence").all() and not rows["virtual"].any()
 
 
-def test_virtual_contact_goes_round_or_closes() -> None:
+@pytest.mark.parametrize("c_s", [0.6, pytest.param(0.0, marks=pytest.mark.slow)])
+def test_virtual_contact_goes_round_or_closes(c_s: float) -> None:
     """A contact of negative length is reached through zero; without damper the branch closes, with it it goes round."""
-    for c_s in (0.0, 0.6):
-        orbit = ns.find_orbit(support(rho=0.14, g=0.02, c_s=c_s, omega=4.5), period_number=1)
-        branch = ns.continue_orbit(orbit, "omega", (3.0, 7.0), virtual=True)
-        times = branch["unknowns"].values[:, [2, 5]]
-        length = times[:, 1] - times[:, 0]
-        contact = np.isfinite(length)
-        assert (branch["virtual"].values[contact] == (length[contact] < 0)).all() and branch["virtual"].any()
-        assert all("came back" in str(text) for text in branch["ended_because"].values)
-        special = ns.special_points(branch)
-        grazes = np.unique(special["omega"].values[special["kind"].values == "grazing"].round(9))
-        assert grazes == pytest.approx(np.sort(known.grazing_frequencies(0.14, 0.02)), abs=1e-9)
+    orbit = ns.find_orbit(support(rho=0.14, g=0.02, c_s=c_s, omega=4.5), period_number=1)
+    branch = ns.continue_orbit(orbit, "omega", (3.0, 7.0), virtual=True)
+    times = branch["unknowns"].values[:, [2, 5]]
+    length = times[:, 1] - times[:, 0]
+    contact = np.isfinite(length)
+    assert (branch["virtual"].values[contact] == (length[contact] < 0)).all() and branch["virtual"].any()
+    assert all("came back" in str(text) for text in branch["ended_because"].values)
+    special = ns.special_points(branch)
+    grazes = np.unique(special["omega"].values[special["kind"].values == "grazing"].round(9))
+    assert grazes == pytest.approx(np.sort(known.grazing_frequencies(0.14, 0.02)), abs=1e-9)
 
 
 def test_virtual_branch_saves_and_is_drawn(impacts: xr.Dataset, tmp_path: Any) -> None:
