@@ -171,6 +171,7 @@ def test_stops_out_of_reach_change_nothing(begun: float, ends: tuple[float, floa
 @pytest.mark.parametrize(
     ("masses", "at", "ends"),
     [
+        (1, 0.5, (0.85, 0.95)),
         (2, 0.4, (1.09, 1.11)),
         pytest.param(1, 0.5, (0.8, 1.0), marks=pytest.mark.slow),
         pytest.param(2, 0.4, (1.07, 1.13), marks=pytest.mark.slow),
