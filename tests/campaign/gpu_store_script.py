@@ -27,9 +27,9 @@ parameters = {{ g = -0.0045 }}
 
 [chart]
 grid = {{ omega = [3.2, 3.69], rho = [0.15, 0.3] }}
-transient = 24
-keep = 12
-max_period = 4
+transient = 8
+keep = 8
+max_period = 2
 device = "{device}"
 any_cpu = {any_cpu}
 

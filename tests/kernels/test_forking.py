@@ -73,7 +73,7 @@ import nonsmooth
 warnings.simplefilter("ignore")
 sys.path.insert(0, FOLDER)
 hung = []
-for k in range(50):  # each while a module is loaded that the child asks for too
+for k in range(MANY):  # each while a module is loaded that the child asks for too
     thread = threading.Thread(target=importlib.import_module, args=(f"slow_{k}",))
     thread.start()
     while f"slow_{k}" not in sys.modules:
@@ -105,18 +105,19 @@ print(forks_itself.status)
 """
 
 
-def run(script: str, folder: Path) -> str:
-    code = script.replace("FOLDER", repr(str(folder)))
+def run(script: str, folder: Path, many: int = 1) -> str:
+    code = script.replace("FOLDER", repr(str(folder))).replace("MANY", str(many))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
-def test_fifty_forks_beside_a_thread_that_loads_modules(tmp_path: Path) -> None:
-    for k in range(50):
+@pytest.mark.parametrize("many", [12, pytest.param(50, marks=pytest.mark.slow)])
+def test_forks_beside_a_thread_that_loads_modules(tmp_path: Path, many: int) -> None:
+    for k in range(many):
         (tmp_path / f"slow_{k}.py").write_text("import time\ntime.sleep(0.05)\nwhole = True\n")
-    assert run(LOADING, tmp_path) == "hung: []"
+    assert run(LOADING, tmp_path, many) == "hung: []"
 
 
 ONCE = """

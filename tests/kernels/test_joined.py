@@ -40,7 +40,9 @@ for n, method in ((1, "auto"), (2, "auto"), (1, "taylor"), (1, "rkf45")):
     system = ns.mechanical(np.eye(n), np.zeros((n, n)), np.eye(n), coordinates=["q", "r"][:n], elements=wall)
     run = ns.simulate(system, start={"q": -1.0}, duration=4.0, samples=9, method=method)
     found.append([run["time"].values.tolist(), run["u"].values[:, 0].tolist()])
-print(json.dumps(found))
+curved = ns.System(states=["x"], parameters={"k": 1.0}, modes={"one": lambda t, u, p: (-p.k * u.x**2,)})
+seen = ns.sensitivity(curved, duration=0.5, start={"x": 2.0}, parameters=["k"])
+print(json.dumps([found, [seen["Phi"].values.item(), seen["P"].values.item()]]))
 """
 
 
@@ -77,9 +79,13 @@ def test_a_name_means_one_thing_in_a_joined_text(text: str) -> None:
 
 
 def test_the_texts_run_as_plain_python() -> None:
-    """As a debugger wants them: from q = -1 a mass comes to its stop at pi / 2, and leaves it with half the speed."""
+    """As a debugger wants them: from q = -1 a mass comes to its stop at pi / 2, and leaves it with half the speed.
+
+    x' = -k x^2 has x = 2 / (1 + 2 k t) from 2, with the derivatives (1 + 2 k t)^-2 and -4 t (1 + 2 k t)^-2."""
     plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", PLAIN], capture_output=True, text=True, check=True, env=plain)
-    for time, q in map(np.array, json.loads(done.stdout)):
+    runs, derivatives = json.loads(done.stdout)
+    np.testing.assert_allclose(derivatives, [0.25, -0.5], rtol=1e-12)
+    for time, q in map(np.array, runs):
         fallen = np.where(time < np.pi / 2, -np.cos(time), 0.5 * np.cos(time))
         np.testing.assert_allclose(q, fallen, atol=1e-8)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 from nonsmooth.kernels.compile.cache import compiled
 from nonsmooth.kernels.compile.folder import cache_folder
@@ -15,6 +16,7 @@ from nonsmooth.kernels.tangent.legs import cross, march_legs
 SCRIPT = """
 import json
 import numpy as np
+import pytest
 import nonsmooth as ns
 from nonsmooth import kernels
 from nonsmooth.flow.variational import VariationalFlow
@@ -52,6 +54,7 @@ def run(folder, **environment):
     return np.array(numbers), compiles
 
 
+@pytest.mark.slow
 def test_addresses(tmp_path) -> None:
     for kernel in (march_legs, cross):  # what is new in this cache are the model's functions
         entry = cache_folder() / "compiled" / compiled(kernel).entry()
