@@ -45,11 +45,11 @@ def measured(theory):
     return ns.control_based_continuation(
         rig,
         "frequency",
-        (5.6, 5.9),
+        (5.68, 5.9),
         frequency=5.72,
         amplitude=0.14,
         step=0.25,
-        holding=ns.Holding(transient=20),
+        holding=ns.Holding(transient=10),
         progress=False,
     )
 
@@ -140,7 +140,7 @@ def test_a_branch_that_leaves_its_range_with_the_first_step_is_a_result_of_no_po
 
 
 def test_ctrl_c_leaves_the_rig_without_a_force_and_keeps_the_points():
-    rig = Bare(free_motion(), calls=25_000)
+    rig = Bare(free_motion(), calls=15_000)
     with pytest.raises(ns.Interrupted) as caught:
         ns.control_based_continuation(
             rig, "frequency", (3.0, 6.8), step=0.01, holding=ns.Holding(mass=0.838, **BRIEFLY), **WITHOUT_CONTACT

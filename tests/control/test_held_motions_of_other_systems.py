@@ -60,6 +60,7 @@ def judge(found, theory):
     return true, unstable["amplitude"].values - true, unstable["amplitude_uncertainty"].values
 
 
+@pytest.mark.slow
 def test_folds_and_unstable_motions_are_those_of_the_equations(theory):
     # The outermost point of this run lies where the curve is level: its frequency at given amplitude is known to 0.046.
     true, away, u = judge(held(1e-3, seed=5), theory)

@@ -134,7 +134,7 @@ def test_an_impact_turns_the_friction_of_its_own_mass_alone(hardening: float) ->
     assert by_both == pytest.approx(np.repeat(by_force, 2, axis=0), abs=1e-9)
 
 
-@pytest.mark.parametrize("method", ["taylor", "rkf45"])
+@pytest.mark.parametrize("method", ["taylor", pytest.param("rkf45", marks=pytest.mark.slow)])
 def test_a_stick_that_began_at_rest_ends_at_any_phase(method: str) -> None:
     """The slope of the speed is mere rounding there, and no scale of it: of 141 phases 5 ended in chatter."""
     system = ns.mechanical(
@@ -203,9 +203,10 @@ def test_many_masses_do_the_same_at_one_instant() -> None:
     np.testing.assert_allclose(last(12), np.repeat(last(1), 12, axis=1), atol=1e-10)
 
 
-def test_two_masses_that_move_against_each_other_turn_at_one_instant() -> None:
+@pytest.mark.parametrize("many", [3, pytest.param(8, marks=pytest.mark.slow)])
+def test_two_masses_that_move_against_each_other_turn_at_one_instant(many: int) -> None:
     """Speeds of 0 and 8e-16, which one mode took for zero and the next did not: the two led back and forth, "ever
-    shorter times", in seven of these runs."""
+    shorter times", in seven of eight such runs."""
 
     def system(*signs: int) -> ns.System:
         names = [f"q{i}" for i in range(len(signs))]
@@ -223,7 +224,7 @@ def test_two_masses_that_move_against_each_other_turn_at_one_instant() -> None:
         )
 
     one, both = system(1), system(1, -1)
-    for x, v in np.random.default_rng(1).uniform(-0.1, 0.1, (8, 2)):
+    for x, v in np.random.default_rng(1).uniform(-0.1, 0.1, (many, 2)):
         alone = ns.simulate(one, periods=6, start=[x, v], samples=2)
         run = ns.simulate(both, periods=6, start=[x, -x, v, -v], samples=2)
         assert alone.sizes["crossing"] > 50

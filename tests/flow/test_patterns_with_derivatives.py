@@ -89,7 +89,7 @@ def end(system, start):
 
 
 @pytest.mark.physics
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ["rubs", "slips", "in sequence", pytest.param("many", marks=pytest.mark.slow)])
 def test_a_run_answers_to_parameters_and_start_as_differences_say(case):
     make, names = CASES[case]
     system, step = make(), 1e-6

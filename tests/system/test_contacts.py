@@ -411,6 +411,7 @@ def rig(order: str = "abs") -> ns.System:
     )
 
 
+@pytest.mark.parametrize("calculus", ["visited", "rows", pytest.param("series", marks=pytest.mark.slow)], indirect=True)
 def test_the_order_of_elements_changes_nothing() -> None:
     grid, found = np.linspace(0, 6 * 2 * np.pi / 0.7, 121), []
     for order in ("abs", "sba"):
@@ -420,6 +421,9 @@ def test_the_order_of_elements_changes_nothing() -> None:
     xr.testing.assert_identical(found[0].drop_attrs(), found[1].drop_attrs())
 
 
+@pytest.mark.parametrize(
+    "calculus", ["visited", *(pytest.param(one, marks=pytest.mark.slow) for one in ("rows", "series"))], indirect=True
+)
 def test_threads_change_nothing(calculus: str) -> None:
     system = rig()
     systems = system, rig() if calculus == "visited" else system  # each visits its modes itself

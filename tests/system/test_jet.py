@@ -142,7 +142,7 @@ def test_linear_oscillator_with_forcing_at_high_order():
 @pytest.mark.parametrize(
     ("fields", "order"),
     [
-        ((10 * (Y - X), X * (28 - Z) - Y, X * Y - sp.Rational(8, 3) * Z), 4),
+        pytest.param((10 * (Y - X), X * (28 - Z) - Y, X * Y - sp.Rational(8, 3) * Z), 4, marks=pytest.mark.slow),
         ((Y, -A * Y - (X + 10) + Z, 20 * (8 - X * sp.sqrt(Z))), 4),
         ((Y + sp.cos(T) ** 2, -sp.sin(X) * sp.exp(-Y / 3) + sp.cos(3 * T + B), sp.tanh(X * Y) / (1 + Z**2) + T), 3),
     ],

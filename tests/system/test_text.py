@@ -164,12 +164,13 @@ def random_expression(random, symbols, depth):
     return [sp.sin(a), sp.sqrt(1 + a**2) + b, sp.exp(-(a**2)) / (1 + b**2) ** sp.Rational(3, 2)][kind - 5]
 
 
-def test_random_expressions_survive():
+@pytest.mark.parametrize("many", [50, pytest.param(150, marks=pytest.mark.slow)])
+def test_random_expressions_survive(many):
     symbols = sp.symbols("u_x u_v p_k t_", real=True)
     names = dict(zip(symbols, ("u.x", "u.v", "p.k", "t"), strict=True))
     table = {name: symbol for symbol, name in names.items()}
     random = np.random.default_rng(8)
-    for _ in range(150):
+    for _ in range(many):
         expression = random_expression(random, symbols, 3)
         text = write_expression(expression, names)
         again = read_expression(text, table)
