@@ -77,7 +77,11 @@ def grazing() -> Any:
 
 
 @pytest.mark.parametrize(
-    ("make", "F"), [(by_element, 0.28), (by_surface, 0.36), pytest.param(by_element, 0.6, marks=pytest.mark.slow)]
+    ("make", "F"),
+    [
+        (by_element, 0.28),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((by_surface, 0.36), (by_element, 0.6))),
+    ],
 )
 def test_from_other_orbits_the_same_branch(make: Any, F: float) -> None:
     """Beside both points visits as short as the square root of the distance: no trivial root beside theirs."""
