@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.parse
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -30,13 +31,25 @@ PATIENCE = 120.0  # seconds; a cold cache compiles in them
 class Server:
     """``nonsmooth explore`` in a process of its own."""
 
-    def __init__(self, *arguments: str, browser: bool = False) -> None:
-        told = [*arguments, *([] if browser else ["--no-browser"]), "--port", "0"]
-        command = [sys.executable, "-m", "nonsmooth", "explore", *told]
+    def __init__(self, folder: Path) -> None:
+        self.told = folder / "told"  # in which what is told to open the page writes its command line
+        browser = folder / "browser"
+        browser.write_text(
+            f"#!{sys.executable}\nimport sys\nopen({str(self.told)!r}, 'w').write(sys.argv[1] + '\\n')\n"
+        )
+        browser.chmod(0o700)
+        command = [sys.executable, "-m", "nonsmooth", "explore", "--port", "0"]
+        command += ["--no-browser"] if os.name == "nt" else []
         heard = None  # a test run in the background of a shell ignores Ctrl-C, and so would what it starts
         if os.name != "nt":
             heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
+        self.process = subprocess.Popen(
+            command,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=heard,
+            env={**os.environ, "BROWSER": f"{browser} %s"},
+        )
         self.said: list[str] = []
         assert self.process.stderr is not None
         for line in self.process.stderr:
@@ -54,6 +67,13 @@ class Server:
         """Process numbers of the workers."""
         path = Path(f"/proc/{self.process.pid}/task")
         return [int(pid) for task in path.iterdir() for pid in (task / "children").read_text().split()]
+
+    def page_told(self) -> Path:
+        """The file that the browser is told to open."""
+        wait_until(lambda: self.told.exists() and self.told.read_text().endswith("\n"), 60)
+        address = urllib.parse.urlsplit(self.told.read_text().strip())
+        assert (address.scheme, address.query) == ("file", "")
+        return Path(urllib.parse.unquote(address.path))
 
     def close(self) -> None:
         self.process.terminate()
@@ -164,9 +184,9 @@ def browser_program() -> str | None:
 
 
 @pytest.fixture(scope="session")
-def server() -> Iterator[Server]:
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     pytest.importorskip("bokeh", reason="the explorer needs bokeh")
-    one = Server()
+    one = Server(tmp_path_factory.mktemp("server"))
     yield one
     one.close()
     said = "".join(one.said)
@@ -185,45 +205,21 @@ def browser() -> Iterator[Any]:
         one.close()
 
 
-@pytest.fixture
-def with_browser() -> Iterator[Server]:
-    """An explorer that opens the browser of the environment variable BROWSER."""
-    pytest.importorskip("bokeh", reason="the explorer needs bokeh")
-    one = Server(browser=True)
-    yield one
-    one.close()
-
-
-def new_tab(browser: Any, first_visit: bool = False, **options: Any) -> Page:
-    """A tab of somebody else: with cookies and storage of its own."""
-    tab = browser.new_context(viewport=SIZE, accept_downloads=True, **options).new_page()
-    tab.set_default_timeout(30_000)
-    if not first_visit:
-        tab.add_init_script("localStorage.setItem('nonsmooth-tour', 'seen')")
-    return Page(tab)
-
-
 @pytest.fixture(scope="session")
-def tab(browser: Any) -> Iterator[Page]:
-    """The tab in which one test after the other looks at a page: a new one compiles all scripts again."""
-    one = new_tab(browser, reduced_motion="reduce")
-    yield one
-    one.tab.context.close()
+def tab(browser: Any, server: Server) -> Iterator[Page]:
+    """The tab in which one test after the other looks at a page: a new one compiles all scripts again.
 
-
-@pytest.fixture
-def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
-    """Open tabs, and see that none of them had an error."""
-    pages: list[Page] = []
-
-    def make(first_visit: bool = False) -> Page:
-        pages.append(new_tab(browser, first_visit))
-        return pages[-1]
-
-    yield make
-    for page in pages:
-        page.tab.context.close()
-        assert page.faults == []
+    Who sits at it has been shown round, and asks for reduced motion."""
+    seen = {"origin": server.origin, "localStorage": [{"name": "nonsmooth-tour", "value": "seen"}]}
+    context = browser.new_context(
+        viewport=SIZE,
+        accept_downloads=True,
+        reduced_motion="reduce",
+        storage_state={"cookies": [], "origins": [seen]},
+    )
+    context.set_default_timeout(30_000)
+    yield Page(context.new_page())
+    context.close()
 
 
 @pytest.fixture

@@ -5,13 +5,12 @@ from __future__ import annotations
 import http.client
 import os
 import signal
-import sys
-import time
 import urllib.parse
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.explorer.conftest import Server
 
 
 def ask(server: Any, path: str, **headers: str) -> tuple[int, dict[str, str]]:
@@ -62,33 +61,36 @@ def test_the_socket_asks_for_the_same(server: Any) -> None:
     assert ask(server, f"/ws?token={server.token}", **handshake("https://example.org"))[0] == 403
 
 
-@pytest.fixture
-def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file in which a browser writes its command line."""
-    log, browser = tmp_path / "told", tmp_path / "browser"
-    browser.write_text(f"#!{sys.executable}\nimport sys\nopen({str(log)!r}, 'w').write(sys.argv[1] + '\\n')\n")
-    browser.chmod(0o700)
-    monkeypatch.setenv("BROWSER", f"{browser} %s")
-    return log
-
-
 @pytest.mark.skipif(os.name == "nt", reason="programs as scripts, and modes of files")
-def test_the_browser_is_told_a_file_that_only_the_user_can_read(told: Path, with_browser: Any) -> None:
+def test_the_browser_is_told_a_file_that_only_the_user_can_read(server: Any) -> None:
     """Every user may read command lines: none holds a token, and the one in the file serves once."""
-    server, end = with_browser, time.monotonic() + 60
-    while not (told.exists() and told.read_text().endswith("\n")):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-    address = urllib.parse.urlsplit(told.read_text().strip())
-    file = Path(urllib.parse.unquote(address.path))
-    assert (address.scheme, address.query) == ("file", "")
+    file = server.page_told()
     assert file.stat().st_mode & 0o777 == 0o600
     leads_to = file.read_text().partition("url=")[2].partition('"')[0]
     assert leads_to.startswith(f"{server.origin}/?token=")
     assert server.token not in file.read_text()
     path = leads_to.removeprefix(server.origin)
     assert [ask(server, path)[0] for _ in range(2)] == [200, 403]
-    assert [ask(server, f"/?token={token}")[0] for token in (server.token, "")] == [200, 403]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="modes of files")
+def test_that_file_goes_with_the_server() -> None:
+    pytest.importorskip("bokeh", reason="the explorer needs bokeh")
+    from nonsmooth.explorer.access import Access
+
+    with Access().page_for_browser("http://127.0.0.1:9") as page:
+        file = Path(urllib.parse.urlsplit(page).path)
+        assert file.stat().st_mode & 0o777 == 0o600
+    assert not file.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="programs as scripts, and Ctrl-C")
+def test_ctrl_c_ends_the_server_and_takes_that_file_along(tmp_path: Path) -> None:
+    pytest.importorskip("bokeh", reason="the explorer needs bokeh")
+    server = Server(tmp_path)
+    file = server.page_told()
+    assert ask(server, f"/?token={server.token}")[0] == 200
     server.process.send_signal(signal.SIGINT)
     server.process.wait(60)
     assert not file.exists()

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("bokeh", reason="the explorer needs bokeh")
 
 from bokeh.events import RangesUpdate, Reset, Tap
-from tests.explorer.without_browser import OWN, P, T, V, X, amplitude, in_this_process, opened
+from tests.explorer.without_browser import OWN, P, T, Tab, V, X, amplitude, in_this_process, opened
 
 from nonsmooth.explorer.catalogue import Catalogue
 
@@ -82,6 +82,28 @@ def test_the_response_is_the_linear_resonance_curve() -> None:
     assert tab.data("response up")["x"][[0, -1]] == pytest.approx([0.5 * P["omega"], 1.5 * P["omega"]])
 
 
+def test_a_jump_and_the_orbits_of_two_clicks_on_its_branches() -> None:
+    """The orbit that is shown is that of the curve that was clicked: figure 9 of the paper, one way and the other."""
+    values = "p.g=0.02&p.rho=0.14&p.omega=4.8&response.low=3&response.high=7"
+    tab = Tab(f"model=discontinuous_support&columns=10&transient=300&keep=16&upper=response&shown=x&{values}")
+    up, down = (tab.data(f"response {word}") for word in ("up", "down"))
+    (at,) = np.flatnonzero(np.abs(up["y"] - down["y"]) > 1e-4)
+    for one in (up, down):
+        tab.event(Tap, "response", x=one["x"][at], y=one["y"][at])
+        ends = dict(tab.heard("readout"))["x"].split(" \u2026 ")
+        low, high = (float(end.split()[0].replace("\u2212", "-")) for end in ends)
+        assert (high - low) / 2000 == pytest.approx(one["y"][at], rel=2e-3)
+
+
+def test_two_pages_have_each_their_own_motion() -> None:
+    first, second = opened(), opened("&p.rho=0.3")
+    for tab, rho in ((first, P["rho"]), (second, 0.3)):
+        ends = np.ptp(tab.page.sheet.views["portrait"].curves.data["xs"][0]) / 2
+        assert ends == pytest.approx(amplitude(P["omega"], rho), rel=1e-4)
+    first.act("set", "p.rho", 0.4)
+    assert second.page.state.values["rho"] == 0.3
+
+
 def test_a_chart_gets_finer_and_is_clicked_and_zoomed() -> None:
     tab = opened("&upper=chart&over=rho&low=0.2&high=0.5&chart.across=omega&chart.low=3&chart.high=5")
     cells = tab.data("chart cells")
@@ -127,6 +149,22 @@ def test_basins_fill_the_figure_and_are_clicked_and_zoomed() -> None:
     ]
     tab.event(Reset, "basins")
     assert not tab.page.state.settings
+
+
+def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor() -> None:
+    tab = Tab("model=discontinuous_support&columns=10&transient=200&keep=16&p.rho=0.323&plane=basins")
+    legend = tab.heard("ui")["legends"]["basins"]
+    assert [words.split(":")[0] for words, _ in legend] == ["period 2 (a)", "period 2 (b)"]
+    cells, marks = tab.data("basins cells"), tab.data("basins points")
+    assert np.isfinite(cells["more"][0]).all()  # of a number that is not there a tip would say NaN
+    kinds = list(dict.fromkeys(marks["marker"]))
+    assert len(kinds) == 2
+    (image,), dx, dy = cells["image"], cells["dw"][0] / 8, cells["dh"][0] / 8
+    for label, kind in ((2, kinds[0]), (3, kinds[1])):
+        row, column = np.argwhere(image == label)[0]
+        tab.event(Tap, "basins", x=cells["x"][0] + (column + 0.5) * dx, y=cells["y"][0] + (row + 0.5) * dy)
+        known = marks["x"][np.array(marks["marker"]) == kind]
+        assert sorted(tab.data("section points")["x"]) == pytest.approx(sorted(known), rel=1e-3)
 
 
 def test_an_address_may_name_its_model_behind_other_things() -> None:

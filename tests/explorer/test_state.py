@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nonsmooth as ns
@@ -22,6 +22,7 @@ FIRST = first_state("discontinuous_support", SYSTEM)
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 
 
+@settings(max_examples=25)
 @given(rho=numbers, low=numbers, start=st.tuples(numbers, numbers), direction=st.sampled_from([*CHOICES["direction"]]))
 def test_a_query_brings_every_field_back(rho: float, low: float, start: tuple[float, float], direction: str) -> None:
     state = replace(FIRST.with_value("rho", rho), low=low, start=start, direction=direction, columns=77)
@@ -34,6 +35,7 @@ def test_a_query_brings_every_field_back(rho: float, low: float, start: tuple[fl
         ("p.rho=__import__('os')", "is no number"),
         ("p.rho=nan", "is no number"),
         ("p.rho=1e999", "is no number"),
+        *((f"p.rho={text}", "is no number") for text in ("1_000", "\uff10.\uff13", "0x1", "\u0663")),  # no form of ours
         ("p.gap=1", "is no parameter; there are: m, k"),
         ("over=x", "allowed: m, k"),
         ("shown=rho", "allowed: x, v"),

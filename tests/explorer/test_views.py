@@ -50,33 +50,63 @@ def tip(page: Any, figure: str, x: float, y: float, words: str) -> str:
     return found[0]
 
 
-def test_branches_lie_over_the_diagram_and_special_points_say_what_they_are(page: Any) -> None:
+@pytest.mark.parametrize(("low", "high"), [(0.38, 0.42), pytest.param(0.2, 0.5, marks=pytest.mark.slow)])
+def test_branches_lie_over_the_diagram_and_special_points_say_what_they_are(page: Any, low: float, high: float) -> None:
+    page.write("low", str(low))
+    page.write("high", str(high))
     page.tab.select_option('[id="branches.show"]', "yes")
+    page.until('document.getElementById("legend-diagram").textContent.includes("flip")')
     page.until_done()
+    assert page.notes() == ""
     special = data(page, "special points")
     flips = [k for k, words in enumerate(special["words"]) if words.startswith("flip") and "period 1," in words]
     (first,) = flips
+    assert special["marker"][first] == "square"
     value = special["x"][first]
     for step, stable in ((-5e-4, False), (5e-4, True)):  # the multiplier passes through -1 there
         orbit = ns.find_orbit(ns.models.discontinuous_support(rho=value + step), period_number=1, progress=False)
         assert orbit.stable is stable
         assert np.isclose(np.sort(orbit.floquet_multipliers.real)[0], -1.0, atol=0.01)
-    unstable, stable = data(page, "unstable branches"), data(page, "stable branches")
-    assert np.nanmin(unstable["x"]) == 0.2  # the orbit of period 1 is followed beyond its flip
-    assert np.nanmax(stable["x"]) == 0.5
+    branches = data(page, "unstable branches"), data(page, "stable branches")
+    assert np.nanmin(branches[0]["x"]) == low  # the orbit of period 1 is followed beyond its flip
+    assert np.nanmax(branches[1]["x"]) == high
     assert "multipliers" in tip(page, "diagram", value, special["y"][first], "flip (period doubling) at 0.401")
+    legends_say_what_is_drawn(page)
     page.picture("branches")
     page.tab.select_option("#shown", "x")
     page.until_done()
     assert abs(np.nanmean(data(page, "stable branches")["y"])) < 0.02  # m, where it was m/s
+    page.tab.select_option('[id="branches.show"]', "no")
+    page.until('!document.getElementById("legend-diagram").textContent.includes("flip")')
+    page.tab.select_option('[id="branches.show"]', "yes")
     page.tab.select_option("#over", "omega")
     page.until("Bokeh.documents[0].get_model_by_name('special points').data.x.length === 0")
-    page.write("low", "3.6")
-    page.write("high", "3.8")
-    page.until_done()
-    assert page.notes() == ""
 
 
+def legends_say_what_is_drawn(page: Any) -> None:
+    """One colour says up in every view, and kinds of branches are told."""
+    legends = page.ui()["legends"]
+    up = {words: color for words, color, *_ in legends["diagram"]}["up"]
+    assert up == dict(legends["response"])["up"]
+    drawn = page.tab.evaluate(
+        """(color => {
+        const source = Bokeh.documents[0].get_model_by_name("diagram image");
+        const seen = new Uint8Array(source.data.image[0].buffer);
+        const [red, green, blue] = [1, 3, 5].map(i => parseInt(color.slice(i, i + 2), 16));
+        for (let i = 0; i < seen.length; i += 4)
+            if (seen[i + 3] && seen[i] === red && seen[i + 1] === green && seen[i + 2] === blue) return true;
+        return false;
+    })""",
+        up,
+    )
+    assert drawn
+    told = page.tab.inner_text("#legend-diagram").replace("\n", "")
+    assert "\u2501stable" in told
+    assert "\u254dunstable" in told
+    assert "\u25a1flip" in told
+
+
+@pytest.mark.slow
 def test_branches_that_nobody_waits_for_are_cancelled_and_the_worker_stays(page: Any, server: Any) -> None:
     page.until_done()
     workers = server.workers()
@@ -103,6 +133,7 @@ def test_a_period_4_motion_has_lines_at_quarters(page: Any) -> None:
     page.picture("spectrum")
 
 
+@pytest.mark.slow
 def test_a_jump_of_figure_9_and_the_orbits_of_two_quick_clicks_on_its_branches(page: Any) -> None:
     page.tab.select_option("#preset", "Fig. 9")
     page.tab.click("#tab-response")
@@ -118,38 +149,44 @@ def test_a_jump_of_figure_9_and_the_orbits_of_two_quick_clicks_on_its_branches(p
     page.picture("response")
 
 
-def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any) -> None:
+@pytest.mark.parametrize("finest", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any, finest: bool) -> None:
     stage = 'Bokeh.documents[0].get_model_by_name("chart cells").data.stage[0]'
-    page.write("transient", "100")
-    page.write("keep", "32")
     page.tab.click("#tab-chart")
     page.until(f'{stage} === "first chart"')
-    page.until(f'{stage} === "chart"')
-    page.until('document.documentElement.dataset.busy === "fine chart"')
-    place = page.tab.evaluate("""(() => {
+    if finest:
+        page.until(f'{stage} === "chart"')
+        page.until('document.documentElement.dataset.busy === "fine chart"')
+    period = 3 if finest else 2
+    place = page.tab.evaluate(
+        """([period, around]) => {
         const data = Bokeh.documents[0].get_model_by_name("chart cells").data, image = data.image[0];
         const [rows, columns] = image.shape, at = (i, j) => image[i * columns + j];
-        for (let i = 2; i < rows - 2; i++) for (let j = 2; j < columns - 2; j++)  // amid cells of period 3
-            if ([-2, -1, 0, 1, 2].every(k => at(i + k, j) === 2 && at(i, j + k) === 2))
+        for (let i = 2; i < rows - 2; i++) for (let j = 2; j < columns - 2; j++)  // amid cells of one period number
+            if (around.every(k => at(i + k, j) === period - 1 && at(i, j + k) === period - 1))
                 return [data.x[0] + (j + 0.5) * data.dw[0] / columns, data.y[0] + (i + 0.5) * data.dh[0] / rows];
-    })()""")
-    assert "exponent near \u2212" in tip(page, "chart", *place, ": period 3,")
+    }""",
+        [period, [-2, -1, 0, 1, 2] if finest else [-1, 0, 1]],
+    )
+    words = tip(page, "chart", *place, f": period {period}")
+    assert not finest or "exponent near \u2212" in words
     page.tab.mouse.click(*page.place("chart", *place))
-    page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("readout").value)[0][1] === "period 3"')
+    page.until(f'JSON.parse(Bokeh.documents[0].get_model_by_name("readout").value)[0][1] === "period {period}"')
     page.picture("chart")
     low, high = (page.ui()["state"][end] for end in ("low", "high"))
     page.tab.mouse.wheel(0, -240)
     page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("ui").value).query.includes("chart.low")')
-    page.until(f'{stage} === "first chart"')
     state = page.ui()["state"]
     assert high - low > state["high"] - state["low"]
-    cells = data(page, "chart cells")
-    assert cells["dw"][0] == pytest.approx((state["high"] - state["low"]) * 40 / 39)
-    page.tab.click("#tab-diagram")
-    page.until_done()
-    assert page.notes() == ""
+    cells = 'Bokeh.documents[0].get_model_by_name("chart cells").data'
+    page.until(f"Math.abs({cells}.dw[0] - {(state['high'] - state['low']) * 40 / 39}) < 1e-9")
+    if finest:
+        page.tab.click("#tab-diagram")
+        page.until_done()
+        assert page.notes() == ""
 
 
+@pytest.mark.slow
 def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) -> None:
     page.write("v-p.rho", "0.323")
     page.tab.click("#tab-basins")

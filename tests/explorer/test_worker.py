@@ -106,7 +106,7 @@ def test_work_that_does_not_ask_is_interrupted_and_the_process_stays(
 ) -> None:
     chaotic = {**job("branches")["values"], "rho": 0.2}  # half a minute that reports nothing
     worker.ask(5, job("branches", values=chaotic, low=0.199, high=0.201, transient=10_000_000))
-    time.sleep(0.5)
+    time.sleep(0.3)
     worker.cancel(5)
     assert last_of(answers, 5)[0] == "cancelled"
     worker.ask(6, job("orbit"))
@@ -148,6 +148,7 @@ def test_an_error_is_a_sentence(worker: Worker, answers: queue.Queue[Answer]) ->
     assert "`gap` is not a parameter" in said
 
 
+@pytest.mark.slow
 def test_one_that_ends_says_so_and_another_begins() -> None:
     answers = queue.Queue[Answer]()
     Worker.idle(answers.put).end()
