@@ -21,8 +21,9 @@ LONGEST = 60  # lines of an output: in a notebook the next cell stays in sight
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 #: What pages do in place of their own in more than a second, and whether they print the same. The whole is marked slow.
 SHORTER = {
-    "a_bench": [("draws=60", "draws=12", False)],
-    "control_based_continuation": [("step=0.3, points=60", "step=0.3, points=3", False)],
+    "a_bench": [("draws=60", "draws=6", False)],
+    "continuation": [('{"omega": (2.5, 8.0), "rho": (0.05, 0.3)}', '{"omega": (4.4, 6.0), "rho": (0.07, 0.16)}', True)],
+    "control_based_continuation": [("step=0.3, points=60", "step=0.3, points=2", False)],
     "elements": [
         ('"mu", [0.1, 0.2, 0.4]', '"mu", [0.1, 0.2, 0.4], transient=100', True),
         ("1.6, 21)", "1.6, 5)", True),
@@ -30,6 +31,8 @@ SHORTER = {
     "fit_your_own_model": [
         ("6.4, 41)", "6.4, 15)", False),
         ('settings={"0": {"rho": 0.0}},', 'settings={"0": {"rho": 0.0}}, tries=1,', False),
+        ("duration=12.0, samples=np.arange(0, 12, 0.05)", "duration=6.0, samples=np.arange(0, 6, 0.05)", False),
+        ("folds=3", "folds=2", True),
     ],
     "first_diagram": [
         ("0.5, 601)", "0.5, 151)", True),
@@ -43,8 +46,12 @@ SHORTER = {
         ("range=(7.0, 10.0)", "range=(7.5, 8.6)", True),
         ("length=4.0", "length=2.0", True),
         ("(-0.0015, 0.002)", "(0.0003, 0.0016)", True),
+        ('"P", (0.0, 1.0)', '"P", (0.0, 0.1)', True),
     ],
     "safe_region": [
+        ("14.0, 37)", "14.0, 13)", True),
+        ("1.0, 19)", "1.0, 7)", True),
+        ("safe.mean()", "safe.mean()", False),
         ("plane, loads=True,", "plane, loads=True, transient=100, keep=20,", True),
         ("14.0, 121)", "14.0, 31)", True),
     ],
@@ -53,9 +60,10 @@ SHORTER = {
         ("np.geomspace(1e-6, 1e-3, 7)", "[3e-5, 1e-4]", True),
         ("np.geomspace(1e-4, 1e-1, 7)", "[3e-3, 1e-2]", True),
         ("n_starts=60", "n_starts=30", True),
-        ("periods=4000", "periods=2500", True),
+        ('3e-4, 1e-3, 3e-3, 1e-2], band=["linear", "tanh"]', '1e-2], band=["linear"]', False),
+        ("periods=4000", "periods=1000", False),
     ],
-    "uncertainty": [("draws=60", "draws=12", False)],
+    "uncertainty": [("draws=60", "draws=6", False)],
 }
 LONG = [page for page in PAGES if page.stem in SHORTER]
 
