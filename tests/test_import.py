@@ -94,6 +94,19 @@ convolution(numpy.ones(8), 8)
 """
 
 
+def test_a_new_system_in_a_cold_process_compiles_no_kernel() -> None:
+    compiles_nothing(run(new_system() + COUNT))
+
+
+def compiles_nothing(counts: str) -> None:
+    """A kernel is compiled once for all."""
+    loads, compiles, generated = map(int, counts.split())
+    assert compiles == 0
+    assert loads >= 1
+    assert generated >= 1
+
+
+@pytest.mark.slow
 def test_a_new_nonlinear_system_in_a_cold_process_costs_little_more_than_its_libraries() -> None:
     """Against the same machine at the same time: seconds differ by half between one hour and another.
 
@@ -105,7 +118,4 @@ def test_a_new_nonlinear_system_in_a_cold_process_costs_little_more_than_its_lib
             break
     else:
         pytest.fail(f"a new system took {took:.2f} s")
-    loads, compiles, generated = map(int, counts.split())  # a kernel is compiled once for all
-    assert compiles == 0
-    assert loads >= 1
-    assert generated >= 1
+    compiles_nothing(counts)

@@ -120,8 +120,8 @@ def campaign(results: list[xr.Dataset], ending: str, n: int, folder: Path, seed:
 
 @pytest.mark.parametrize("ending", ["nc", "zarr"])
 def test_altered_bytes_are_refused(ending: str, swept: xr.Dataset, points: xr.Dataset, tmp_path: Path) -> None:
-    outcome = campaign([with_all_types(swept), points], ending, 40, tmp_path, seed=1)
-    assert outcome.total() == 40 and outcome["refused"] >= 5
+    outcome = campaign([with_all_types(swept), points], ending, 20, tmp_path, seed=1)
+    assert outcome.total() == 20 and outcome["refused"] >= 5
 
 
 @pytest.mark.slow

@@ -80,7 +80,7 @@ def datasets(draw: st.DrawFn) -> xr.Dataset:
 DRAWN: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck.function_scoped_fixture]}
 
 
-@settings(max_examples=8, **DRAWN)
+@settings(max_examples=3, **DRAWN)
 @example(result=OF_EVERY_TYPE)
 @given(result=datasets())
 def test_one_hash_through_memory_and_both_formats(result: xr.Dataset, tmp_path: Path) -> None:

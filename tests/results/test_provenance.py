@@ -206,8 +206,23 @@ print(ns.__version__, json.loads(ns.load(pathlib.Path(sys.argv[1]) / "run.nc").a
 """
 
 
-def test_files_that_were_copied_without_being_installed_work(tmp_path: Path) -> None:
-    done = subprocess.run([sys.executable, "-c", NOT_INSTALLED, str(tmp_path)], capture_output=True, text=True)
+#: The same without a run, its libraries and its file.
+RECORDED = """
+from nonsmooth.results.labels import Labels, QuantityLabel
+from nonsmooth.results.provenance import provenance
+one = {"x": QuantityLabel("m")}
+labels = Labels("a", one, {}, ("m",), (), (), {}, "text")
+print(ns.__version__, json.loads(provenance(labels, "simulate", {}, method="exact")["nonsmooth"])["version"])
+"""
+
+
+@pytest.mark.parametrize(
+    "code",
+    [NOT_INSTALLED.partition("run = ")[0] + RECORDED, pytest.param(NOT_INSTALLED, marks=pytest.mark.slow)],
+    ids=["record", "run"],
+)
+def test_files_that_were_copied_without_being_installed_work(code: str, tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["unknown", "unknown"]
 
