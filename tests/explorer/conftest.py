@@ -128,9 +128,9 @@ class Page:
 
     def _shown(self) -> dict[str, Any]:
         """Channels by which one page differs from another at the same place in its history."""
-        names = ("ui", "readout", "notes", "recording", "building", "equations")
+        names = ("ui", "readout", "notes", "recording", "equations")  # a form stays as it was left
         channels = {name: json.loads(self.tab.evaluate(CHANNEL, name) or "null") or {} for name in names}
-        for passing in ("heard", "can", "tabs"):
+        for passing in ("heard", "can", "tabs", "models"):  # those that were built stay
             channels["ui"].pop(passing)
         for hidden in ("chart", "basins"):  # legends of views that nobody sees there
             channels["ui"]["legends"].pop(hidden)

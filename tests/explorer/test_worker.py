@@ -41,8 +41,9 @@ def cancelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Cancelled]:
     sys.unraisablehook = hook
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def worker(answers: queue.Queue[Answer]) -> Iterator[Worker]:
+    """The process that the test before it left."""
     one = Worker.idle(answers.put)
     yield one
     one.close()
