@@ -266,7 +266,7 @@ def test_a_first_study_file_reads_with_each_of_its_comments_taken_out(
 @pytest.mark.parametrize(
     ("model", "verb"),
     [
-        ("discontinuous_support", "simulate"),
+        pytest.param("discontinuous_support", "simulate", marks=pytest.mark.slow),  # the last is one too
         ("discontinuous_support", "sweep"),
         ("discontinuous_support", "frequency_response"),
         ("impact_oscillator", "poincare"),

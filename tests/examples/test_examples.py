@@ -11,8 +11,8 @@ import pytest
 #: Sizes that show the same in less time than those of the pictures: arguments, and constants in capitals.
 SMALL = {
     "basins": {"points": 28},
-    "chart": {"points": 24},
-    "basin_fractions": {"points": 14, "starts": 30},
+    "chart": {"points": 18},
+    "basin_fractions": {"points": 10, "starts": 20},
     "element_loads": {"points": 25},
     "real_silverbox": {"samples": 600, "TEST": 10_000},
     "relief_valve": {"points": 89},
