@@ -49,7 +49,7 @@ def test_the_grazing_point_of_each_draw_is_the_closed_form_and_so_are_its_deriva
         ns.find_orbit(s),
         "rho",
         (0.08, 0.15),
-        draws=10,
+        draws=4,
         seed=3,
         first_order=True,
         settings={"g": (0.02, 1e-4)},
@@ -128,10 +128,10 @@ def scaled_stop() -> ns.System:
 
 
 def test_the_band_of_a_branch_with_folds_scales_as_its_motions_do() -> None:
-    s = scaled_stop()
+    s = scaled_stop().with_parameters(omega=1.2)
     orbit = ns.find_orbit(s)
     found = known(s, {"a": 0.05})
-    band = ns.propagate(found, ns.continue_orbit, orbit, "omega", (0.8, 1.9), draws=3, step=0.015, **QUIET)
+    band = ns.propagate(found, ns.continue_orbit, orbit, "omega", (1.15, 1.4), draws=2, step=0.015, **QUIET)
     assert "fold" in band["special_kind"].values
     amplitude = band["maximum"].sel(state="q").values
     folds = band["special_value"].values[band["special_kind"].values == "fold"]
@@ -236,8 +236,8 @@ def test_the_crossings_of_a_run_are_matched_where_they_are_the_same_ones() -> No
 def test_of_a_diagram_of_branches_the_special_points_have_distributions() -> None:
     s = support().with_parameters(g=-0.0045, rho=0.42)
     found = known(s, {"k": 0.004})
-    band = ns.propagate(found, ns.bifurcation_diagram, s, "rho", (0.38, 0.43), n=5, draws=3, **QUIET)
-    alone = ns.propagate(found, ns.continue_orbit, ns.find_orbit(s), "rho", (0.38, 0.43), draws=3, **QUIET)
+    band = ns.propagate(found, ns.bifurcation_diagram, s, "rho", (0.38, 0.43), n=3, draws=2, **QUIET)
+    alone = ns.propagate(found, ns.continue_orbit, ns.find_orbit(s), "rho", (0.38, 0.43), draws=2, **QUIET)
     at = int(np.flatnonzero(band["special_kind"].values == "flip")[0])
     expected = alone["special_value_draws"].values[:, 0]
     np.testing.assert_allclose(band["special_value_draws"].values[:, at], expected, rtol=1e-7)

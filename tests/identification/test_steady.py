@@ -68,7 +68,7 @@ def test_intervals_hold_the_truth() -> None:
     for _ in range(10):
         y = amplitude()[::2] + ERROR * rng.standard_normal(len(at))
         for error, held in scores.items():
-            found = ns.fit(system, response(y, error, at=at), ["c", "k"], progress=False)
+            found = ns.fit(system, response(y, error, at=at), ["c", "k"], tries=1, progress=False)
             held.append(
                 [(found[name] - true) / found.estimate(name).uncertainty for name, true in (("c", 0.2), ("k", 4.0))]
             )
@@ -128,7 +128,7 @@ def test_sections_of_doubled_motions() -> None:
     )
     sweep = ns.sweep(system, "rho", at, transient=600, keep=32, progress=False)
     assert {1, 2, 4} <= set(sweep["period_number"].values.tolist())
-    for first in (1, 2, 3, 4):
+    for first in (1, 4):
         data = sweep[["section", "period_number"]].isel(iterate=slice(first, None))
         data["section_error"] = ("state", [2e-5, 2e-4])
         found = ns.fit(system.with_parameters(k=8.5, k_s=1150.0), data, ["k", "k_s"], progress=False)
@@ -168,7 +168,8 @@ def test_amplitudes_by_scipy() -> None:
         forcing={"q": lambda t, p: 0.3 * np.cos(p.omega * t)},
         elements={"stop": stop},
     )
-    found = ns.fit(system, response([height(w) for w in at], 1e-5, at=at), ["c", "g", "k_s"], progress=False)
+    readings = response([height(w) for w in at], 1e-5, at=at)
+    found = ns.fit(system, readings, ["c", "g", "k_s"], tries=1, progress=False)
     assert [found[name] for name in ("c", "g", "k_s")] == pytest.approx([0.2, 0.4, 5.0], rel=1e-6)
 
 
@@ -209,7 +210,12 @@ def test_sensors_and_settings_of_responses() -> None:
     """Two responses to known forces by a sensor of unknown gain; a third set by two parameters at once, as a table."""
     gain = 250.0
     runs = [response(gain * amplitude(F=F), gain * ERROR) for F in (0.3, 0.6)]
-    options: Any = {"settings": [{"F": 0.3}, {"F": 0.6}], "measured": {"q": ns.Sensor(gain=200.0)}, "progress": False}
+    options: Any = {
+        "settings": [{"F": 0.3}, {"F": 0.6}],
+        "measured": {"q": ns.Sensor(gain=200.0)},
+        "tries": 1,
+        "progress": False,
+    }
     found = ns.fit(linear(c=0.25), runs, ["c", "k", "q.gain"], **options)
     assert [found["c"], found["k"], found.extra["q.gain"].value] == pytest.approx([0.2, 4.0, gain], rel=1e-6)
     own = ns.fit(linear(c=0.25), runs, ["c", "k", "q.gain"], per_run=["q.gain"], **options)
@@ -217,7 +223,7 @@ def test_sensors_and_settings_of_responses() -> None:
     table = pd.DataFrame({"omega": OMEGA, "F": np.where(OMEGA < 2, 0.3, 0.6)})
     table["amplitude"] = amplitude(F=table["F"].values)
     for data in (table, table.set_index("omega"), {name: table[name].tolist() for name in table}):
-        assert ns.fit(linear(c=0.25), data, "c", progress=False)["c"] == pytest.approx(0.2, rel=1e-6)
+        assert ns.fit(linear(c=0.25), data, "c", tries=1, progress=False)["c"] == pytest.approx(0.2, rel=1e-6)
 
 
 def test_a_parameter_that_was_set_in_every_run_is_not_told() -> None:
@@ -229,7 +235,7 @@ def test_a_parameter_that_was_set_in_every_run_is_not_told() -> None:
 def test_an_outlier_hardly_counts_where_that_is_asked() -> None:
     far = amplitude() + np.where(np.arange(len(OMEGA)) == 7, 80 * ERROR, 0.0)
     plain = ns.fit(linear(), response(far), ["c", "k"], tries=1, progress=False)
-    huber = ns.fit(linear(), response(far), ["c", "k"], loss="huber", progress=False)
+    huber = ns.fit(linear(), response(far), ["c", "k"], tries=1, loss="huber", progress=False)
     away = [abs(found["k"] - 4.0) / 0.0025 for found in (plain, huber)]
     assert away[1] < 0.2 * away[0]
 
@@ -314,11 +320,11 @@ def test_models_are_chosen_by_settings_that_were_held_out() -> None:
     """Every third setting is held out in turn: the error there is that of a fit to the others, by the formula."""
     y = amplitude() + ERROR * np.random.default_rng(3).standard_normal(len(OMEGA))
     models = {"damped": (linear(), ["c", "k"]), "too soft": (linear(k=3.8), "c")}
-    ranked = ns.select_model(models, response(y), folds=3, tries=2, progress=False)
+    ranked = ns.select_model(models, response(y), folds=3, tries=1, progress=False)
     assert ranked.attrs["best"] == "damped" and float(ranked["rms"].sel(model="too soft")) > 3.0
     for fold in range(3):
         out = np.arange(len(OMEGA)) % 3 == fold
-        found = ns.fit(linear(), response(y[~out], at=OMEGA[~out]), ["c", "k"], progress=False)
+        found = ns.fit(linear(), response(y[~out], at=OMEGA[~out]), ["c", "k"], tries=1, progress=False)
         left = (y - amplitude(found["c"], found["k"]))[out] / ERROR
         assert float(ranked["squared_error"][0, fold]) == pytest.approx(np.mean(left**2), rel=1e-4)
     with pytest.raises(ValueError, match="too short for folds = 22: .* settings of steady states"):
@@ -359,6 +365,7 @@ def test_a_force_that_only_the_response_tells_stays_where_it_is_until_then() -> 
         measured={"q": ns.Sensor("laser", gain=1e3)},
         settings={"0": {"F": 0.0}},
         priors={"q.gain": (1000.0, 10.0)},
+        tries=1,
         progress=False,
     )
     for name, value in {"k": k, "c": c, "F": F, "q.offset": 5.0, "q.gain": 1000.0}.items():

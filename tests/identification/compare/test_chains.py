@@ -42,7 +42,7 @@ def test_a_setting_that_follows_from_the_frequency_changes_along_a_response() ->
     """An unbalance pulls with m e w^2; a draw is off this rule by the same force at every frequency."""
     expected = np.array([amplitudes(w, 0.3 * w**2)[1] for w in FREQUENCIES])
     rule = {"F": (lambda p: 0.3 * p["w"] ** 2, 0.02)}
-    found = ns.compare(runs(expected), chain(), settings=rule, draws=5)  # w sets the period: no parameter= is needed
+    found = ns.compare(runs(expected), chain(), settings=rule, draws=2)  # w sets the period: no parameter= is needed
     np.testing.assert_allclose(found["theory_at_run"], expected, rtol=1e-9)
     by_hand = [amplitudes(w, 0.3 * w**2)[1] for w in found["w"].values]
     np.testing.assert_allclose(found["theory_amplitude"].values[:, 0], by_hand, rtol=1e-9)
