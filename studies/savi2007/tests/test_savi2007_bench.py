@@ -31,6 +31,21 @@ def test_what_the_measurement_has_forked_ends_with_it(tmp_path: Path, monkeypatc
     assert not _runs(forked)
 
 
+def test_what_a_failed_measurement_said_last_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here by a program that says its arguments and fails; -P keeps out the modules of the folder it is started in."""
+    other = tmp_path / "python"
+    other.write_text('#!/bin/sh\necho begun\necho "$@" | tr -d "\\n"\nexit 1\n')
+    other.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(other))
+    heard: list[str] = []
+    with (
+        Measurement(tmp_path, figures_of_the_study()[:1], quick=True) as bench,
+        pytest.raises(RuntimeError, match=r"failed; see .*log\.txt.*said last: -P -c import .*true, false\]"),
+    ):
+        bench.wait(heard.append)
+    assert not heard  # but for what took time
+
+
 def _runs(process: int) -> bool:
     """Return True while a process runs; one that has ended may wait for whoever collects it."""
     try:

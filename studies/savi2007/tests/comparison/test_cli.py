@@ -24,7 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rig = VirtualRig.published()
     length = 0.03896
     gap = -0.0012 + mean_position(rig, length)
-    settings = [SteadyRun(voltage_for(rig, 11.15), length, gap, 25.0, {}, place) for place in (None, -0.02)]
+    settings = [SteadyRun(voltage_for(rig, 11.15), length, gap, 15.0, {}, place) for place in (None, -0.02)]
     made = {
         "section": records(rig, "section", settings, settle=30.0),
         "response": records(rig, "response", without_support(rig, 14)),

@@ -40,6 +40,7 @@ def found(session):
     return ns.identify(session)
 
 
+@pytest.mark.slow
 def test_the_parameters_are_the_injected_ones(rig, found):
     for name in ("m", "k", "k_s", "c", "c_s"):
         assert abs(found[name] - rig.truth[name]) < 4 * found.uncertainty[name] < 0.02 * rig.truth[name]
@@ -50,11 +51,13 @@ def test_the_parameters_are_the_injected_ones(rig, found):
     assert abs(rest.value - true) < 4 * rest.uncertainty < 2e-5 and abs(true) > 2e-4
 
 
+@pytest.mark.slow
 def test_each_anomaly_is_named(rig, found):
     said = unnamed({"truth": rig.truth, "notes": found.notes})
     assert said == {}
 
 
+@pytest.mark.slow
 def test_compare_counts_the_gap_from_where_the_car_swings(rig, session, found):
     reference = gap_reference(session, offset=gap_offset(found, session))
     for item in session.recordings("contact"):
@@ -69,6 +72,7 @@ def test_compare_counts_the_gap_from_where_the_car_swings(rig, session, found):
         assert value < x.max() < value + 2e-3 and x.min() < -2 * x.max()
 
 
+@pytest.mark.slow
 def test_without_taps_the_sensors_zero_is_as_uncertain_as_friction_holds_the_car(rig, session, found, tmp_path):
     folder = shutil.copytree(session.folder, tmp_path / "s")
     text = (folder / "session.toml").read_text()
@@ -85,8 +89,8 @@ def test_without_taps_the_sensors_zero_is_as_uncertain_as_friction_holds_the_car
     assert abs(value - found.estimate("rest_position").value) < 2 * error
 
 
-def test_springs_and_support_swapped_are_refused(session, tmp_path):
-    folder = shutil.copytree(session.folder, tmp_path / "s")
+def test_springs_and_support_swapped_are_refused(rig, tmp_path):
+    folder = rig.write_session(tmp_path / "s", ["springs", "support"])
     (folder / "springs.csv").rename(folder / "x")
     (folder / "support.csv").rename(folder / "springs.csv")
     (folder / "x").rename(folder / "support.csv")

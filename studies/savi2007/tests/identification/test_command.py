@@ -15,7 +15,7 @@ def taps(tmp_path_factory):
     from nonsmooth_savi2007.rig import VirtualRig
 
     folder = tmp_path_factory.mktemp("rig") / "session"
-    few = {"impulse": {"velocities": (0.5, -0.35, 0.2), "duration": 8.0}}
+    few = {"impulse": {"velocities": (0.5, -0.3), "duration": 6.0}}
     return VirtualRig(7).write_session(folder, ["impulse", "voltage"], options=few)
 
 

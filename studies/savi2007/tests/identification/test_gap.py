@@ -158,9 +158,10 @@ def test_the_sensors_error_is_that_of_a_mean_of_four():
     assert error == pytest.approx(1e-5 * np.sqrt(12 / 5) / np.sqrt(4))
 
 
-def test_a_gap_by_graze_is_neither_too_sure_nor_too_vague():
+@pytest.mark.parametrize("sessions", [7, pytest.param(12, marks=pytest.mark.slow)])
+def test_a_gap_by_graze_is_neither_too_sure_nor_too_vague(sessions):
     z = []
-    for seed in range(12):
+    for seed in range(sessions):
         gap = grazing_amplitude(8.43 - 0.01 * (seed % 5), 0.010, W, B, F)
         found = grazing_gap(stepping(gap, seed=seed), decay_of(W, B, F, 1e-6), kappa=KAPPA)
         z.append((found.value - gap) / found.uncertainty)

@@ -34,15 +34,14 @@ def test_free_decay_tells_viscous_damping_from_dry_friction():
         return u[1], -(w**2) * u[0] - b * u[1] - f * np.tanh(u[1] / 1e-3)
 
     runs = []
-    for speed in (0.5, 0.3):
+    for speed in (0.5, -0.4, 0.3):
         solved = solve_ivp(
-            rate, (0, 10), (0.0, speed), "LSODA", dense_output=True, rtol=1e-9, atol=1e-11, max_step=0.02
+            rate, (0, 7), (0.0, abs(speed)), "LSODA", dense_output=True, rtol=1e-9, atol=1e-11, max_step=0.02
         )
-        for way in (1, -1):  # the law is odd
-            time = np.arange(0, 10, 0.01)
-            at = time + 5e-5 * rng.standard_normal(len(time)) - 0.5
-            x = way * np.where(at > 0, solved.sol(np.maximum(at, 0))[0], 0.0)
-            runs.append(run("impulse", time, COUNT * np.rint(x / COUNT)))
+        time = np.arange(0, 7, 0.01)
+        at = time + 5e-5 * rng.standard_normal(len(time)) - 0.5
+        x = np.sign(speed) * np.where(at > 0, solved.sol(np.maximum(at, 0))[0], 0.0)  # the law is odd
+        runs.append(run("impulse", time, COUNT * np.rint(x / COUNT)))
     found = free_decay(runs)
     error = np.sqrt(np.diag(found.covariance))
     assert np.all(np.abs(found.values - [w, b, f, 0.0]) < 3.5 * error)

@@ -21,9 +21,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "springs": {"n": 2},
     "support": {"n": 2},
     "drop": {"n": 2},
-    "impulse": {"velocities": (0.5, -0.3), "duration": 5.0},
-    "response": {"voltages": (4.0, 7.0), "duration": 5.0},
-    "contact": {"regimes": ((9.55, 0.027),), "duration": 5.0},
+    "impulse": {"velocities": (0.5, -0.3), "duration": 3.0},
+    "response": {"voltages": (4.0, 7.0), "duration": 3.0},
+    "contact": {"regimes": ((9.55, 0.027),), "duration": 3.0},
 }
 
 

@@ -91,7 +91,7 @@ def test_equal_recordings_give_equal_files(tmp_path: Path) -> None:
     assert one.read_bytes() == two.read_bytes()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     st.lists(st.floats(allow_infinity=False, allow_nan=False, width=64), min_size=1, max_size=30),
     st.floats(-1e6, 1e6),
