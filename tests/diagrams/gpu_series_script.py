@@ -32,8 +32,8 @@ results = {
         rtol=1e-10,
         **SHORT,
     ),
-    "chart": both(ns.chart, two_wells(), {"F": [0.1], "c": [0.3]}, lyapunov=40, **SHORT | {"transient": 30}),
-    "basins": both(ns.basins, two_wells(), {"x": [-1.0, 1.2], "v": [0.5]}, **SHORT | {"transient": 40}),
+    "chart": both(ns.chart, two_wells(), {"F": [0.1], "c": [0.3]}, lyapunov=40, **SHORT),
+    "basins": both(ns.basins, two_wells(), {"x": [-1.0, 1.2], "v": [0.5]}, **SHORT | {"transient": 20}),
     "memory": both(ns.sweep, two_wells(), "F", [0.1, 0.27], direction=None, **SHORT),
     "exact": both(ns.sweep, filtered(), "F", [0.2, 0.3], direction=None, **SHORT | {"method": "auto"}),
     "planar": both(

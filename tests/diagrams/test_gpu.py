@@ -107,6 +107,7 @@ def test_every_kernel_compiles_for_the_types_it_is_launched_with(
     compiled("linear", {name: simulated["launched"][name] for name in sorted(entries)}, optimised)
 
 
+@pytest.mark.slow
 def test_the_benchmark_compares_both_devices() -> None:
     code = "import gpu, gpu_valve as v; v.TRANSIENT, v.KEEP = 6, 4; print(*gpu.compared('Fig. 9', 3), *v.compared(2))"
     paths = os.pathsep.join([*sys.path, str(SCRIPT.parents[2] / "benchmarks")])

@@ -60,7 +60,7 @@ def test_a_frequency_response() -> None:
     ids=["plain", "carried", "starts", "refined"],
 )
 def test_a_chart(options: dict[str, Any]) -> None:
-    grid = {"rho": np.linspace(0.3, 0.5, 24), "g": np.linspace(-0.005, -0.004, 44)}
+    grid = {"rho": np.linspace(0.3, 0.5, 16), "g": np.linspace(-0.005, -0.004, 44)}
     named = {"transient": 20, "max_period": 4, "threads": 1, **options}
     whole = ns.chart(SYSTEM, grid, progress=False, **named)
     with pytest.raises(ns.Interrupted) as caught:
