@@ -10,7 +10,7 @@ import equilibria_enumeration
 import numpy as np
 import pytest
 
-SOME = (0, 9, 44, 213)  # those that take less
+SOME = (0, 9, 44, pytest.param(213, marks=pytest.mark.slow))  # those that take less
 
 
 @pytest.mark.parametrize("seed", SOME)

@@ -108,7 +108,10 @@ CASES: dict[str, tuple[Any, ...]] = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+LONG = "two masses with a stop between them and one outside"
+
+
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.slow) if one == LONG else one for one in CASES])
 def test_duffing_masses_move_as_in_the_reference(name: str) -> None:
     mass, load, rate, start, *pairs = CASES[name]
     reference, system = duffing(mass, load, rate, *pairs)
@@ -121,7 +124,7 @@ def test_duffing_masses_move_as_in_the_reference(name: str) -> None:
     assert np.abs(run["u"].values[at] - expected).max() < 1e-8
 
 
-@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.parametrize("e", [0.0, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_a_mass_in_a_ring_rolls_along_it(e: float) -> None:
     """The gap R - |q| has a curvature: what rests at the ring is pressed by v^2 / R too."""
     R, load, rate = 1.0, 1.5, 0.7
