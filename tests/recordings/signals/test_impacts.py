@@ -94,7 +94,10 @@ def test_bounces_in_noise_of_unknown_size() -> None:
     assert all(np.min(np.abs(times - t)) < 5e-3 or t > times[5] for t in at)
 
 
-@pytest.mark.parametrize("motion", [sine(0.02, 3.0), sine(0.003, 30.0, 0.3, 20.0), decay(0.02, 4.46, 0.52, 15.0)])
+SLOW = pytest.param(sine(0.003, 30.0, 0.3, 20.0), marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("motion", [sine(0.02, 3.0), sine(0.003, 30.0, 0.3, 5.0), SLOW, decay(0.02, 4.46, 0.52, 15.0)])
 def test_no_impact_is_found_where_there_is_none(motion: object) -> None:
     found = impacts(motion.t, motion.counted, resolution=COUNT)
     assert found.sizes["impact"] == 0
