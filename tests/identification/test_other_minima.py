@@ -37,7 +37,7 @@ def before_a_stop(seed: int) -> tuple[ns.System, dict[str, Any], dict[str, float
     return system, {"q": (at, q), "f": (t, force)}, truth, guess
 
 
-@pytest.mark.parametrize("seed", [54, 183, pytest.param(38, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [38, 54, 183])
 def test_a_near_fit_in_another_minimum_is_left(seed: int) -> None:
     """From these guesses a fit of the whole record ends 5 standard uncertainties off or more, at a smooth minimum."""
     system, recording, truth, guess = before_a_stop(seed)
@@ -78,7 +78,6 @@ def test_an_unknown_that_only_has_a_limit_on_one_side_says_so() -> None:
     assert np.isnan(profile["low"]) and 1.4 < profile["high"] < 1.45
 
 
-@pytest.mark.slow
 def test_two_driven_records_of_a_chain_lead_to_the_least_minimum() -> None:
     """From here windows four times as long at a time led both records to a minimum 5.6 standard uncertainties off."""
     rig = ns.mechanical(

@@ -96,7 +96,7 @@ def test_a_motor_that_wanders_is_in_the_uncertainty():
         rate = omega / 1.2
         return lambda t: omega * t + omega * size / rate * np.sin(rate * t + omega)
 
-    runs = [driven(omega, crank, 8.0, phase=wandering(omega)) for omega, crank in ((11.15, 0.039), (8.0, 0.030))]
+    runs = [driven(omega, crank, 10.0, phase=wandering(omega)) for omega, crank in ((11.15, 0.039), (8.0, 0.030))]
     found = shoot_contacts(runs, decay_of(W, B, F, PLACE), kappa=1.1 * KAPPA, gamma=0.5 * GAMMA)
     error = np.sqrt(np.diag(found.covariance))
     assert abs(found.values[3] - KAPPA) < 3 * error[3] and abs(found.values[4] - GAMMA) < 3 * error[4]
