@@ -45,11 +45,11 @@ def measured(theory):
     return ns.control_based_continuation(
         rig,
         "frequency",
-        (5.68, 5.9),
+        (5.6, 5.9),
         frequency=5.72,
         amplitude=0.14,
         step=0.25,
-        holding=ns.Holding(transient=10),
+        holding=ns.Holding(transient=20),
         progress=False,
     )
 
