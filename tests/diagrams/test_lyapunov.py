@@ -522,6 +522,26 @@ def test_a_chatter_that_ends_in_rest_loses_place_and_speed(restitution: float, r
 
 
 @pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_what_comes_to_rest_without_an_impulse_loses_its_place_too(method: str) -> None:
+    """A mass that rubs comes down on a table without bouncing on, tied to another one that goes on."""
+    load = {name: lambda t, p: 1.721 * (np.cos(0.9474 * t) - 0.5758) for name in ("q", "y")}
+    system = ns.mechanical(
+        np.eye(2),
+        np.diag([0.0926, 0.0613]),
+        [[2.2983, -0.3], [-0.3, 1.5451]],
+        coordinates=["q", "y"],
+        forcing=load,
+        period=2 * np.pi / 0.9474,
+        elements={
+            "s": Stop(at="q", side=-1, position=0.0, restitution=0.0494),
+            "f": Coulomb(at="q", friction=0.0622),
+        },
+    )
+    exponents = ns.lyapunov(system, periods=20, transient=20, method=method, progress=False).exponents.values
+    assert (np.sort(exponents)[:2] == -np.inf).all() and np.isfinite(np.sort(exponents)[2:]).all()
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
 def test_an_order_of_two_impacts_that_matters_is_said(method: str) -> None:
     """Equal masses strike together: with a spring between them the exponents are those of one alone and of the
     difference, whose oscillator strikes in the same way; with a damper the map has a kink."""

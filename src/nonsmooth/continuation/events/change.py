@@ -180,8 +180,7 @@ def is_tolerance(point: OrbitPoint, indicator: int, among: Sequence[TracedTransi
     """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
 
     It differs from another one of its condition, with the other sign, by a small number, in one ``among`` transitions
-    (none given: in any). Where a transition has no other row, one of them is what fires (a slip that turns, and has
-    turned a little later), and neither is a tolerance."""
+    (none given: in any)."""
     flow, values = point.shooting.flow, point.shooting.values
     z = np.linspace(0.3, 0.7, flow.n) * flow.scale
     for jump in among or flow.traced.transitions:
@@ -191,7 +190,5 @@ def is_tolerance(point: OrbitPoint, indicator: int, among: Sequence[TracedTransi
             one, two = (flow.indicator(values, each.indicator, jump.source, 0.0, z) for each in (other, row))
             size = float(np.abs(two.h_z) @ flow.scale)
             if np.allclose(one.h_z, two.h_z, rtol=1e-9, atol=0.0) and 0.0 < abs(one.h - two.h) < TOLERANCE * size:
-                pair, every = {row.indicator, other.indicator}, flow.traced.transitions
-                if not any(each.rows and {fired.indicator for fired in each.rows} <= pair for each in every):
-                    return True
+                return True
     return False
