@@ -78,8 +78,8 @@ def test_an_unknown_that_only_has_a_limit_on_one_side_says_so() -> None:
     assert np.isnan(profile["low"]) and 1.4 < profile["high"] < 1.45
 
 
-def test_two_driven_records_of_a_chain_lead_to_the_least_minimum() -> None:
-    """From here windows four times as long at a time led both records to a minimum 5.6 standard uncertainties off."""
+def driven_chain(until: int, samples: int, which: slice = slice(2)) -> tuple[ns.System, list[dict[str, Any]]]:
+    """Two masses that meet, the first one rubs; records of the other one, each under a force of its own."""
     rig = ns.mechanical(
         np.diag([1.0, 0.5]),
         [["c", -0.05], [-0.05, 0.15]],
@@ -93,19 +93,39 @@ def test_two_driven_records_of_a_chain_lead_to_the_least_minimum() -> None:
             "rub": ns.elements.Coulomb(at="a", friction="mu"),
         },
     )
-    rng, ti, at = np.random.default_rng(0), np.linspace(0, 12, 241), np.linspace(0, 12, 301)
+    rng, ti, at = np.random.default_rng(0), np.linspace(0, until, 20 * until + 1), np.linspace(0, until, samples)
     forces = [
         6 * np.sin(2 * np.pi * (0.3 + 0.03 * ti) * ti),
         5 * np.sign(np.sin(2.1 * ti)) * np.exp(-0.02 * ti),
     ]
     records = []
-    for force in forces:
-        run = ns.simulate(rig, duration=12, samples=at, inputs={"f": (ti, force)})
+    for force in forces[which]:
+        run = ns.simulate(rig, duration=until, samples=at, inputs={"f": (ti, force)})
         b = run.drop_duplicates("time", keep="last").sel(time=at, method="nearest").u.sel(state="b").values
         records.append({"b": (at, b + 2e-3 * rng.standard_normal(len(at))), "load": (ti, force)})
+    return rig, records
+
+
+def fitted(rig: ns.System, records: Any) -> ns.ParameterSet:
     first = rig.with_parameters(c=0.32, k=9.3, e=0.65, g=0.24, mu=0.12)
-    found = ns.fit(first, records, ["c", "k", "e", "g", "mu"], measured=["b"], inputs={"f": "load"}, progress=False)
+    return ns.fit(first, records, ["c", "k", "e", "g", "mu"], measured=["b"], inputs={"f": "load"}, progress=False)
+
+
+@pytest.mark.parametrize(("until", "samples"), [(8, 201), pytest.param(12, 301, marks=pytest.mark.slow)])
+def test_two_driven_records_of_a_chain_lead_to_the_least_minimum(until: int, samples: int) -> None:
+    """From here windows four times as long at a time led both records to a minimum 5.6 standard uncertainties off; of
+    the shorter ones to one 9.2 off, from which derivatives promised nothing better over short windows."""
+    rig, records = driven_chain(until, samples)
+    found = fitted(rig, records)
     for name in found:
         assert abs(found[name] - rig.values[name]) < 3.5 * found.uncertainty[name], name
     assert found.extra["b.noise"].value == pytest.approx(2e-3, rel=0.1)
     assert not found.anomalies
+
+
+@pytest.mark.slow
+def test_a_minimum_that_short_windows_leave_is_said_behind_a_move_too() -> None:
+    """25 standard uncertainties off: a fit that has moved to a lower minimum is looked at again."""
+    found = fitted(*driven_chain(12, 301, slice(1, 2)))
+    assert abs(found["e"] - 0.6) > 10 * found.uncertainty["e"]
+    assert any("another minimum" in one for one in found.anomalies)

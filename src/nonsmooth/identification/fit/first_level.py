@@ -25,7 +25,7 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError, check_keys, shortened
-from nonsmooth.identification.arrow import Residuals, inverted, reduced, settle
+from nonsmooth.identification.arrow import Residuals, settle
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
 from nonsmooth.identification.fit.window import Window
 from nonsmooth.identification.fit.windows import Windows
@@ -85,20 +85,6 @@ def level(stage: Stage, used: Any = None, reach: float = 1.0) -> Stage:
     if problem.jumps and reach != problem.reach:
         state = problem.residuals(theta, starts, True)
     return Stage(problem, theta, starts, state)
-
-
-def foreseen(problem: Windows, theta: FloatArray, starts: FloatArray) -> float:
-    """The sum of squared residuals over the noise to which derivatives lead from here, all starts free."""
-    state, known = problem.residuals(theta, starts, True), _known(problem)
-    normal, right, back = reduced(problem, state)
-    if not np.isfinite(normal).all():
-        return 0.0
-    step, found = inverted(normal + known)[0] @ (right - known @ (theta - problem.unknowns.centre)), 0.0
-    for i, (piece, start) in enumerate(zip(problem.pieces, back, strict=True)):
-        own, n = step[piece.which], len(piece.readings[0])
-        left = state.residuals[i] - state.in_parameters[i] @ own - state.in_start[i] @ start.step(own)
-        found += float(np.sum((left[:n] / problem.noise[piece.readings[1]]) ** 2))
-    return found if np.isfinite(found) else 0.0
 
 
 def _known(problem: Windows) -> FloatArray:

@@ -16,7 +16,7 @@ from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.fit.beginnings import beginnings, drawn
 from nonsmooth.identification.fit.first_level import Stage, level, read_modes, without_disagreeing
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, states_from_samples
-from nonsmooth.identification.fit.growth import Grown, finished, grow, with_steady
+from nonsmooth.identification.fit.growth import Grown, finished, grow, seen, with_steady
 from nonsmooth.identification.fit.likelihood import looked_beside, posterior_of
 from nonsmooth.identification.fit.motion import Marcher
 from nonsmooth.identification.fit.outcome import outcome
@@ -271,7 +271,7 @@ def best_of(
     if best is None:
         assert why is not None
         raise SolveError(_NONE.format(tries=tries, why=why))
-    best = looked_beside(best, lambda stage: finished(stage, problem.noise))
+    best = seen(looked_beside(best, lambda stage: finished(stage, problem.noise)), length, start, free)
     return with_steady(both, best.theta, best) if both.steady else best
 
 

@@ -19,7 +19,6 @@ from nonsmooth.identification.arrow import Residuals, inverted, reduced, settle
 from nonsmooth.identification.fit.first_level import (
     BETTER,
     Stage,
-    foreseen,
     level,
     other_beginnings,
     rechosen,
@@ -40,7 +39,6 @@ _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share
 _NEAR = 0.6  # residuals of a guess over the readings' own size, up to which the longest windows are fitted from it
 _QUIET = 0.5  # residuals of the first windows over irregularity, from which these are the noise
 _CHANCE = 1e-6  # that short windows fit so much better by chance
-_NO_CHANCE = 1e-3  # by derivatives at the fit over long ones: short ones need not be fitted to see that they do not
 _EXACT = 1e-4  # of the noise squared: residuals of short windows that are those of the arithmetic
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
 _FAST, _SLOW = (4.0, 2.0), (1.3, 2.0)  # by how much longer windows become at a time, and where another minimum is near
@@ -63,8 +61,8 @@ class Grown(Stage):
         Whether they have a structure that shows that the model is missing a part.
     stuck : bool
         Whether longer windows did not fit though neighbouring motions do not separate fast.
-    opened : bool
-        Whether short windows with starts of their own fit better than noise allows.
+    opened : bool, optional
+        Whether short windows with starts of their own fit better than noise allows; None where nobody has looked.
     begins : tuple of (int, int, float)
         Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
     doubted : tuple of int
@@ -76,7 +74,7 @@ class Grown(Stage):
     rms: float
     missing: bool = False
     stuck: bool = False
-    opened: bool = False
+    opened: bool | None = None
     begins: tuple[tuple[int, int, float], ...] = ()
     doubted: tuple[int, ...] = ()
 
@@ -154,7 +152,7 @@ def grow(
     if near is not None:
         if _opened(near, length, start, free) is None:
             told()
-            return near
+            return replace(near, opened=False)
         near, theta = replace(near, opened=True), near.theta
     stage = settle_first(problem, theta, length, start, free)
     quiet = np.minimum(problem.noise, _noise(stage.problem, stage.state))
@@ -169,10 +167,11 @@ def grow(
         return replace(finished(stage, problem.noise, rounds), stuck=stuck)
 
     found = whole(stage, _FAST)
-    if found.good and (opened := _opened(found, length, start, free)) is not None:
-        other = whole(opened, _SLOW)
-        best = other if other.rank < found.rank else found
-        found = replace(best, opened=best is found or _opened(best, length, start, free) is not None)
+    if found.good:
+        opened = _opened(found, length, start, free)
+        found = replace(found, opened=opened is not None)
+        if opened is not None and (other := whole(opened, _SLOW)).rank < found.rank:
+            found = other
     return found if near is None or found.rank < near.rank else near
 
 
@@ -228,15 +227,6 @@ def _opened(whole: Grown, length: float, start: FloatArray | None, free: bool) -
     (few, total), (many, all_) = _freedom(now), _freedom(plain)
     if total != all_ or not many > few:
         return None
-
-    def chance(opened: float, shared: float = 1.0) -> float:
-        """That noise alone lets them fit so much better."""
-        gained = (_reduced(closed) * many - opened * few) / (many - few)
-        return float(f.sf(gained / max(opened, _EXACT) / shared, many - few, few))
-
-    least = foreseen(now, stage.theta, stage.starts)  # less than that of long windows, where derivatives are right
-    if least < _reduced(closed) * many and chance(least / few) > _NO_CHANCE:
-        return None
     try:
         opened = level(stage)
     except SolveError:
@@ -244,7 +234,16 @@ def _opened(whole: Grown, length: float, start: FloatArray | None, free: bool) -
     residuals = [residuals_of(now, opened.state, c) for c in range(len(now.sensors))]
     if not np.isfinite(np.concatenate(residuals)).all():
         return None
-    return opened if chance(_reduced(opened), max(map(correlation_times, residuals))) < _CHANCE else None
+    each, shared = _reduced(opened), max(map(correlation_times, residuals))
+    gained = (_reduced(closed) * many - each * few) / (many - few)
+    return opened if f.sf(gained / max(each, _EXACT) / shared, many - few, few) < _CHANCE else None
+
+
+def seen(found: Grown, length: float, start: FloatArray | None, free: bool) -> Grown:
+    """A fit with its mark whether short windows fit better than noise allows."""
+    if found.opened is not None:
+        return found
+    return replace(found, opened=_opened(found, length, start, free) is not None)
 
 
 def _longer_windows(stage: Stage, length: float) -> Stage | None:
