@@ -24,6 +24,9 @@ def test_random_starts_fill_their_box_and_repeat() -> None:
     assert np.abs(table.mean(axis=0) - [0.0, 2.25]).max() < 0.1
     flat = ns.random_starts(4, [0, 1], [1, 1], seed=1)
     assert all(len(one) == 2 and one[1] == 1.0 for one in flat)
+    for low, high in (({"x": 1.0}, {"x": -1.0}), ([1.0], [-1.0])):
+        with pytest.raises(ValueError, match="low must be finite and not above high"):
+            ns.random_starts(2, low, high, seed=1)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Places beside its optimum at which a fit looks for other minima."""
+"""Places beside its optimum at which a fit looks for other minima; the states whose rate is another one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import nonsmooth as ns
 from nonsmooth.identification.fit import likelihood
+from nonsmooth.identification.fit.first_windows import rates
 
 
 @pytest.mark.parametrize("another_piece", [True, False])
@@ -30,3 +32,21 @@ def test_places_between_are_looked_at_where_the_farthest_is_of_another_piece(
     problem.weights = lambda state: state
     found = likelihood._beside(SimpleNamespace(problem=problem, theta=np.zeros(1), starts=[None]))
     assert [place.tolist() for _, _, place in found] == [[5.0]] * another_piece
+
+
+def test_a_place_has_its_rate_where_it_also_stands_still() -> None:
+    """Of three states: x moves by v in one mode and stands in the other, v and the drift of w are no state's."""
+    system = ns.System(
+        states=["x", "v", "w"],
+        parameters={"d": 1.0},
+        modes={
+            "moves": lambda t, u, p: (u.v, -u.x, p.d),
+            "stands": lambda t, u, p: (0.0 * u.x, 0.0 * u.v, p.d),
+        },
+        indicators={"gap": lambda t, u, p: u.x - p.d},
+        transitions=[
+            ns.Transition("moves", "stands", when="gap > 0"),
+            ns.Transition("stands", "moves", when="gap < 0"),
+        ],
+    )
+    assert rates(system) == {0: 1}

@@ -45,7 +45,8 @@ def test_a_near_fit_in_another_minimum_is_left(seed: int) -> None:
     assert not found.anomalies
     for name, value in truth.items():
         assert abs(found[name] - value) < 3 * found.uncertainty[name], name
-    assert found.estimate("q.noise").value == pytest.approx(4e-4, rel=0.15)
+    noise = found.estimate("q.noise")
+    assert noise.value == pytest.approx(4e-4, rel=0.15) and noise.unit == "m"
 
 
 def released() -> tuple[ns.System, dict[str, Any]]:
@@ -76,6 +77,7 @@ def test_an_unknown_that_only_has_a_limit_on_one_side_says_so() -> None:
     assert "no parabola" in found.identifiability["static"]
     (profile,) = (one.data for one in found.findings if one.name == "static, profile")
     assert np.isnan(profile["low"]) and 1.4 < profile["high"] < 1.45
+    assert any("static: 95 % limits no limit to" in note and "does not bound it" in note for note in found.notes)
 
 
 def driven_chain(until: int, samples: int, which: slice = slice(2)) -> tuple[ns.System, list[dict[str, Any]]]:

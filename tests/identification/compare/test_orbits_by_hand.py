@@ -59,6 +59,9 @@ def test_whole_periods_begin_at_phase_zero() -> None:
     at = 1 + np.arange(32) / 16
     assert found.shape == (2, 16, 2)
     assert found.reshape(32, 2) == pytest.approx(np.column_stack([at, at**3]), abs=1e-11)
+    cubes = np.where((phase > 2.4) & (phase < 2.6), np.nan, phase**3)
+    told = np.isfinite(fold(phase, np.column_stack([phase, cubes]), 16)).all(axis=(1, 2))
+    assert told.tolist() == [True, False]  # the period in which readings are lost
 
 
 @pytest.mark.parametrize(("drift", "drifting"), [(0.0, False), (5.0, True)])
