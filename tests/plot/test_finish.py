@@ -182,7 +182,7 @@ def test_slides_have_a_style_of_their_own(run, tmp_path) -> None:
     with Image.open(ns.plot.save_figure(ax, tmp_path / "slide.png")) as picture:
         assert picture.size == (1920, 1080)
     journal = ns.plot.time_history(run)  # behind the block it is the journal's again
-    assert journal.figure.get_size_inches()[0] == pytest.approx(84 / 25.4)
+    assert journal.figure.get_size_inches() == pytest.approx([84 / 25.4, 0.72 * 84 / 25.4])
     assert journal.lines[0].get_linewidth() == 0.8
 
 
