@@ -113,7 +113,7 @@ def _not_unique(system: System, jump: TracedTransition) -> str:
     return ""
 
 
-def wrong_way(system: System, log: TrajectoryLog) -> str:
+def reason_of(system: System, log: TrajectoryLog) -> str:
     """A sentence where the last reset of a failed run left the state on its way on through the surface, where sliding
     had no unique way on, or where states are so large that impacts are not told from rest; else nothing.
 
@@ -142,7 +142,7 @@ def wrong_way(system: System, log: TrajectoryLog) -> str:
             "after it. Give the velocity that it returns the other sign; a push that leads on through its surface "
             "takes two modes, one on each side."
         )
-    largest = np.nanmax(np.abs(np.concatenate([log.u_before, log.u_after])), axis=0)
+    largest = np.nanmax(np.abs(np.concatenate([log.u_before, log.u_after])), axis=0, initial=0.0)
     states = zip(system.states, largest, system.scale_vector(), strict=True)
     large = {name: float(f"{u:.2g}") for name, u, scale in states if u > LARGE * scale}
     if large and meter_of(system) is not None:

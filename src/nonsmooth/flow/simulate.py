@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
-from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, warn_if_slow, wrong_way
+from nonsmooth.flow.failure import reason_of, refuse_beyond_stops, solve_error, warn_if_slow
 from nonsmooth.flow.inputs import driven, under
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, as_called, solver_of
@@ -204,7 +204,7 @@ def check_complete(log: TrajectoryLog, system: System, state: State, period: flo
     where = dict(zip(system.states, map(float, state.u), strict=True))
     raise solve_error(
         log.status,
-        wrong_way(system, log),
+        reason_of(system, log),
         begun=(system, state.u),
         time=float(time),
         state=where,

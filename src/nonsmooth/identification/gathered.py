@@ -14,6 +14,7 @@ from nonsmooth.identification.compare.draws import drawn_variables, quantiles
 from nonsmooth.identification.compare.response import nearest_alike
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.labels import labelled
+from nonsmooth.results.schema import with_amplitude
 from nonsmooth.system.system import System
 
 #: Dims over which results list what they found, however much it was: the value of each and what its rows share.
@@ -32,7 +33,7 @@ class Gathered:
     """The results of draws, brought to the dims of the one at the parameters found."""
 
     def __init__(self, centre: xr.Dataset) -> None:
-        self.centre = centre = _with_amplitude(centre)
+        self.centre = centre = with_amplitude(centre)  # its quantiles do not follow from those of the extremes
         self.branch = str(centre.attrs.get("parameter", "")) if "point" in centre.dims else ""
         names = [*centre.data_vars, *([self.branch] if self.branch else [])]
         held = [str(name) for name in names if centre[name].size and name != "status"]
@@ -48,7 +49,7 @@ class Gathered:
 
     def add(self, result: xr.Dataset) -> None:
         """Keep what a draw gave."""
-        result = _same_attractors(self.centre, _with_amplitude(result), self.plain)
+        result = _same_attractors(self.centre, with_amplitude(result), self.plain)
         there = {name: _at_same(self.centre[name], result[name]) for name in self.plain if name in result}
         named = [one for one in self.centre.values() if one.dims in EVENTS and one.dtype.kind in "iuU"]
         other = {dim for one in named for dim in one.dims if not np.array_equal(one, result.get(one.name, np.nan))}
@@ -125,14 +126,6 @@ class Gathered:
         if not (share < 1).any():
             return {}
         return {f"{name}_share": labelled(self.centre[name].dims, share, f"share of draws that have {name} here")}
-
-
-def _with_amplitude(result: xr.Dataset) -> xr.Dataset:
-    """A result with half the difference of its extremes, whose quantiles do not follow from theirs."""
-    if "amplitude" in result or "maximum" not in result or "minimum" not in result:
-        return result
-    half = 0.5 * (result["maximum"] - result["minimum"])
-    return result.assign(amplitude=half.assign_attrs(long_name="half the peak-to-peak value"))
 
 
 def _same_attractors(centre: xr.Dataset, result: xr.Dataset, names: list[str]) -> xr.Dataset:

@@ -18,9 +18,9 @@ _QUANTILES = "_quantiles"
 
 def ends_of(result: xr.Dataset) -> list[xr.Dataset]:
     """A result with its lowest, and with its highest quantiles in place of the values; none where it has no bands."""
-    if "quantile" not in result.coords:
-        return []
     names = [str(name) for name in result.data_vars if str(name).endswith(_QUANTILES)]
+    if not names:
+        return []
     ends = (result[names].isel(quantile=at, drop=True) for at in (0, -1))
     return [result.assign({name.removesuffix(_QUANTILES): end[name] for name in names}) for end in ends]
 
@@ -35,7 +35,7 @@ def fill(ax: Axes, result: xr.Dataset, x: Any, low: FloatArray, high: FloatArray
 
 
 def bars(ax: Axes, ends: list[xr.Dataset], heights: FloatArray) -> None:
-    """Bars over the quantiles of special points, at their heights (lines, special)."""
-    low, high = (one["special_value"].values for one in ends)
-    for row in heights:
+    """Bars over the quantiles of special points, at their heights (lines, special); none without ``ends``."""
+    for row in heights if ends else ():
+        low, high = (one["special_value"].values for one in ends)
         ax.hlines(row, low, high, color=style.COLORS["section"], linewidth=0.8, zorder=6)

@@ -11,6 +11,7 @@ from nonsmooth.plot import bands, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, columns, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.labels import words_of_flags
+from nonsmooth.results.schema import with_amplitude
 from nonsmooth.system.kinds import Positive
 from nonsmooth.tables.quantities import dataset_of
 
@@ -136,9 +137,7 @@ def draw_branch(
     for rows in zip(*(ordinates_of(one, name, quantity) for one in ends), strict=True):
         bands.fill(ax, result, values, *rows, color=shade)
     if special and result.sizes.get("special", 0):
-        heights = ordinates[:, result["special_point"].values.astype(int)]
-        if ends:
-            bands.bars(ax, ends, heights)
+        bands.bars(ax, ends, ordinates[:, result["special_point"].values.astype(int)])
         _mark_special(ax, result, values, ordinates)
     return name
 
@@ -155,11 +154,8 @@ def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> FloatArray:
     if "eigenvalues" in result:
         rest = result["u"].sel(state=name).values.astype(float)
         return np.zeros((1, len(rest))) if quantity == "amplitude" else rest[None, :]
-    if quantity == "amplitude" and quantity not in result:
-        chosen = 0.5 * (result["maximum"] - result["minimum"]).sel(state=name)
-    else:
-        source = "returns" if quantity == "section" and "returns" in result else quantity
-        chosen = result[source].sel(state=name)
+    source = "returns" if quantity == "section" and "returns" in result else quantity
+    chosen = with_amplitude(result)[source].sel(state=name)
     others = [dim for dim in chosen.dims if dim != "point"]
     return np.asarray(chosen.transpose(*others, "point").values, dtype=float).reshape(-1, result.sizes["point"])
 

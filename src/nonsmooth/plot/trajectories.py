@@ -57,7 +57,8 @@ def time_history(ax: Axes, result: xr.Dataset, *, y: Name | None = None, shade: 
     if ends := bands.ends_of(result):
         curves = with_gaps(result, time, *(column(one, "u", name).values for one in ends))
         bands.fill(ax, result, *curves, color=style.COLORS["first"])
-        ax.legend()
+        if ax.get_legend_handles_labels()[1]:
+            ax.legend()
     ax.plot(*with_gaps(result, time, column(result, "u", name).values), color=style.COLORS["first"])
     if shade:
         style.shade(ax, time, _away(result, shade))

@@ -270,11 +270,18 @@ def sweep(
     return result.transpose(parameter, "direction", "start", ...).squeeze(list(squeeze))
 
 
+def with_amplitude(result: xr.Dataset) -> xr.Dataset:
+    """The result with half the difference of its extremes, where it has these alone."""
+    if "amplitude" in result or "maximum" not in result or "minimum" not in result:
+        return result
+    half = 0.5 * (result["maximum"] - result["minimum"])
+    return result.assign(amplitude=half.assign_attrs(long_name="half the peak-to-peak value"))
+
+
 def response(swept: xr.Dataset, jumps: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """The result of ``frequency_response``: the sweep with its amplitudes and jumps."""
     parameter = swept[swept["maximum"].dims[0]]
-    amplitude = 0.5 * (swept["maximum"] - swept["minimum"])
-    variables: dict[str, Any] = {"amplitude": amplitude.assign_attrs(long_name="half the peak-to-peak value")}
+    variables: dict[str, Any] = {"amplitude": with_amplitude(swept)["amplitude"]}
     for column in _JUMP:
         of_parameter = column.field in ("value", "step")
         words = f"{parameter.name}, {column.words}" if of_parameter else column.words
