@@ -94,3 +94,25 @@ def test_ctrl_c_ends_the_server_and_takes_that_file_along(tmp_path: Path) -> Non
     server.process.send_signal(signal.SIGINT)
     server.process.wait(60)
     assert not file.exists()
+
+
+def test_ctrl_c_is_heard_while_something_is_freed() -> None:
+    """Python forgets an exception raised in ``__del__``: as a closed page is freed, Ctrl-C was lost."""
+    ioloop = pytest.importorskip("tornado.ioloop", reason="the explorer needs bokeh")
+    from nonsmooth.explorer.serve import run
+
+    class Page:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        loop, pages = ioloop.IOLoop(), [Page()]
+        loop.add_callback(pages.clear)
+        loop.call_later(60, loop.stop)
+        with pytest.raises(KeyboardInterrupt):
+            run(loop)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+        loop.close()

@@ -113,21 +113,22 @@ def fitted(rig: ns.System, records: Any) -> ns.ParameterSet:
     return ns.fit(first, records, ["c", "k", "e", "g", "mu"], measured=["b"], inputs={"f": "load"}, progress=False)
 
 
-@pytest.mark.parametrize(("until", "samples"), [(8, 201), pytest.param(12, 301, marks=pytest.mark.slow)])
-def test_two_driven_records_of_a_chain_lead_to_the_least_minimum(until: int, samples: int) -> None:
+@pytest.mark.parametrize(
+    ("until", "samples", "which"),
+    [
+        (8, 201, slice(2)),
+        (8, 161, slice(1, 2)),
+        pytest.param(12, 301, slice(2), marks=pytest.mark.slow),
+        pytest.param(12, 301, slice(1, 2), marks=pytest.mark.slow),
+    ],
+)
+def test_driven_records_of_a_chain_lead_to_the_least_minimum(until: int, samples: int, which: slice) -> None:
     """From here windows four times as long at a time led both records to a minimum 5.6 standard uncertainties off; of
-    the shorter ones to one 9.2 off, from which derivatives promised nothing better over short windows."""
-    rig, records = driven_chain(until, samples)
+    the shorter ones to one 9.2 off, from which derivatives promised nothing better over short windows. The second
+    record alone ended 18 or 25 off, farther than whole records show: as far as short windows leave it open."""
+    rig, records = driven_chain(until, samples, which)
     found = fitted(rig, records)
     for name in found:
         assert abs(found[name] - rig.values[name]) < 3.5 * found.uncertainty[name], name
     assert found.extra["b.noise"].value == pytest.approx(2e-3, rel=0.1)
     assert not found.anomalies
-
-
-@pytest.mark.slow
-def test_a_minimum_that_short_windows_leave_is_said_behind_a_move_too() -> None:
-    """25 standard uncertainties off: a fit that has moved to a lower minimum is looked at again."""
-    found = fitted(*driven_chain(12, 301, slice(1, 2)))
-    assert abs(found["e"] - 0.6) > 10 * found.uncertainty["e"]
-    assert any("another minimum" in one for one in found.anomalies)

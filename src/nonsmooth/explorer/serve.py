@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+import signal
 import socket
 import sys
+import threading
 import webbrowser
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -106,10 +108,34 @@ def explore(
         if page is not None:
             server.io_loop.add_callback(webbrowser.open, page)
         try:
-            server.io_loop.start()
+            run(server.io_loop)
         finally:
             server.stop()
             end_spare()
+
+
+def run(loop: Any) -> None:
+    """Run a loop of events until Ctrl-C, which it is told: an exception there and then is lost where something is
+    being freed. A second Ctrl-C raises at once."""
+    asked: list[int] = []
+
+    def ask(number: int, _: object) -> None:
+        asked.append(number)
+        if len(asked) > 1:
+            raise KeyboardInterrupt
+        loop.asyncio_loop.call_soon_threadsafe(loop.stop)
+
+    usual = signal.getsignal(signal.SIGINT)
+    heard = usual is signal.default_int_handler and threading.current_thread() is threading.main_thread()
+    if heard:
+        signal.signal(signal.SIGINT, ask)
+    try:
+        loop.start()
+    finally:
+        if heard:
+            signal.signal(signal.SIGINT, usual)
+    if asked:
+        raise KeyboardInterrupt
 
 
 def _load() -> None:

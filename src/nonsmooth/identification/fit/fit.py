@@ -259,7 +259,7 @@ def best_of(
                 advance(step)
 
             try:
-                found = grow(problem, guess, min(times * length, longest), begin, free, longest, told)
+                found = grow(problem, guess, (length, min(times * length, longest), longest), begin, free, told)
             except SolveError as reason:
                 why = reason
             else:
@@ -271,7 +271,8 @@ def best_of(
     if best is None:
         assert why is not None
         raise SolveError(_NONE.format(tries=tries, why=why))
-    best = seen(looked_beside(best, lambda stage: finished(stage, problem.noise)), length, start, free)
+    best = looked_beside(seen(best, length, start, free), lambda stage: finished(stage, problem.noise))
+    best = seen(best, length, start, free)
     return with_steady(both, best.theta, best) if both.steady else best
 
 

@@ -9,7 +9,7 @@ Chaos 14 (2004) 1905).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,10 +38,10 @@ _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a 
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
 _NEAR = 0.6  # residuals of a guess over the readings' own size, up to which the longest windows are fitted from it
 _QUIET = 0.5  # residuals of the first windows over irregularity, from which these are the noise
-_CHANCE = 1e-6  # that short windows fit so much better by chance
+_CHANCE = 1e-3  # that short windows fit so much better by chance
 _EXACT = 1e-4  # of the noise squared: residuals of short windows that are those of the arithmetic
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
-_FAST, _SLOW = (4.0, 2.0), (1.3, 2.0)  # by how much longer windows become at a time, and where another minimum is near
+_FASTER = (4.0, 2.0)  # by how much windows become longer at a time, tried in turn
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
 
@@ -63,6 +63,8 @@ class Grown(Stage):
         Whether longer windows did not fit though neighbouring motions do not separate fast.
     opened : bool, optional
         Whether short windows with starts of their own fit better than noise allows; None where nobody has looked.
+    apart : array (p,)
+        Standard uncertainties of the unknowns over these windows, zero where nobody has looked.
     begins : tuple of (int, int, float)
         Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
     doubted : tuple of int
@@ -75,6 +77,7 @@ class Grown(Stage):
     missing: bool = False
     stuck: bool = False
     opened: bool | None = None
+    apart: FloatArray = field(default_factory=lambda: np.zeros(0))
     begins: tuple[tuple[int, int, float], ...] = ()
     doubted: tuple[int, ...] = ()
 
@@ -136,51 +139,40 @@ class Grown(Stage):
 def grow(
     problem: Windows,
     theta: FloatArray,
-    length: float,
+    lengths: tuple[float, float, float],
     start: FloatArray | None,
     free: bool,
-    longest: float,
     told: Callable[[], None],
 ) -> Grown:
     """Fit from a first guess; SolveError if not even the first windows can be fitted.
 
-    ``problem`` is without windows, its ``noise`` a first estimate; ``length`` and ``longest`` are those of the first
-    windows and of the longest ones; ``start`` and ``free`` as in :func:`first_windows`; ``told`` is called once a
-    level is done.
+    ``problem`` is without windows, its ``noise`` a first estimate; ``lengths`` are those of the shortest windows, of
+    the first ones here and of the longest ones; ``start`` and ``free`` as in :func:`first_windows`; ``told`` is called
+    once a level is done.
     """
+    short, length, longest = lengths
     near = _at_once(problem, theta, start, free, longest)
     if near is not None:
-        if _opened(near, length, start, free) is None:
+        near = seen(near, short, start, free)
+        if not near.opened:
             told()
-            return replace(near, opened=False)
-        near, theta = replace(near, opened=True), near.theta
+            return near
+        theta = near.theta
     stage = settle_first(problem, theta, length, start, free)
     quiet = np.minimum(problem.noise, _noise(stage.problem, stage.state))
     if (quiet < _QUIET * problem.noise).any():  # few samples a swing: their irregularity was the motion's
         stage = settle_first(replace(problem, noise=quiet), stage.theta, length, start, free)
     told()
     poor = _reduced(stage) > POOR
-    rounds = 2 if poor else _ROUNDS
-
-    def whole(stage: Stage, factors: tuple[float, float]) -> Grown:
-        stage, stuck = (stage, False) if poor else _lengthened(stage, length, longest, factors, told)
-        return replace(finished(stage, problem.noise, rounds), stuck=stuck)
-
-    found = whole(stage, _FAST)
-    if found.good:
-        opened = _opened(found, length, start, free)
-        found = replace(found, opened=opened is not None)
-        if opened is not None and (other := whole(opened, _SLOW)).rank < found.rank:
-            found = other
+    stage, stuck = (stage, False) if poor else _lengthened(stage, length, longest, told)
+    found = replace(finished(stage, problem.noise, 2 if poor else _ROUNDS), stuck=stuck)
     return found if near is None or found.rank < near.rank else near
 
 
-def _lengthened(
-    stage: Stage, wide: float, longest: float, factors: tuple[float, float], told: Callable[[], None]
-) -> tuple[Stage, bool]:
+def _lengthened(stage: Stage, wide: float, longest: float, told: Callable[[], None]) -> tuple[Stage, bool]:
     """The fit over windows that grow up to the longest ones, and whether they got stuck on the way."""
     while len(stage.problem.pieces) > len(stage.problem.records) and wide < longest:
-        for wider in (min(factor * wide, longest) for factor in factors):
+        for wider in (min(factor * wide, longest) for factor in _FASTER):
             longer = _longer_windows(stage, wider)
             told()
             if longer is not None:
@@ -216,34 +208,31 @@ def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free
     return final if final.good and _spreads(found) < _CHAOS else None
 
 
-def _opened(whole: Grown, length: float, start: FloatArray | None, free: bool) -> Stage | None:
-    """The fit over short windows with starts of their own, where it is better than noise allows (F-test of nested
-    models): then the sum of squares over long ones has another minimum, or the model lacks a part."""
+def seen(whole: Grown, length: float, start: FloatArray | None, free: bool) -> Grown:
+    """A fit with its marks of short windows with starts of their own: how far these leave the unknowns open, and
+    whether they fit better than noise allows (F-test of nested models): then the sum of squares over long ones has
+    another minimum, or the model lacks a part."""
     from scipy.stats import f
 
-    plain = whole.problem.plain
+    if whole.opened is not None:
+        return whole
+    plain, closed = whole.problem.plain, replace(whole, opened=False)
     now = plain.of(first_windows(plain, whole.theta, length, start, free))
-    stage, closed = Stage(now, whole.theta, now.starts), Stage(plain, whole.theta, whole.starts)
     (few, total), (many, all_) = _freedom(now), _freedom(plain)
     if total != all_ or not many > few:
-        return None
+        return closed
     try:
-        opened = level(stage)
+        short = level(Stage(now, whole.theta, now.starts))
     except SolveError:
-        return None
-    residuals = [residuals_of(now, opened.state, c) for c in range(len(now.sensors))]
+        return closed
+    residuals = [residuals_of(now, short.state, c) for c in range(len(now.sensors))]
     if not np.isfinite(np.concatenate(residuals)).all():
-        return None
-    each, shared = _reduced(opened), max(map(correlation_times, residuals))
-    gained = (_reduced(closed) * many - each * few) / (many - few)
-    return opened if f.sf(gained / max(each, _EXACT) / shared, many - few, few) < _CHANCE else None
-
-
-def seen(found: Grown, length: float, start: FloatArray | None, free: bool) -> Grown:
-    """A fit with its mark whether short windows fit better than noise allows."""
-    if found.opened is not None:
-        return found
-    return replace(found, opened=_opened(found, length, start, free) is not None)
+        return closed
+    each, shared = _reduced(short), max(map(correlation_times, residuals))
+    gained = (_reduced(Stage(plain, whole.theta, whole.starts)) * many - each * few) / (many - few)
+    better = f.sf(gained / max(each, _EXACT) / shared, many - few, few) < _CHANCE
+    apart = np.sqrt(np.diag(inverted(reduced(now, short.state)[0] + now.unknowns.precision)[0]))
+    return replace(whole, opened=bool(better), apart=apart)
 
 
 def _longer_windows(stage: Stage, length: float) -> Stage | None:

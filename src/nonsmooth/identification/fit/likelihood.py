@@ -197,7 +197,8 @@ def _drawn(grown: Grown, at: list[tuple[int, int]], count: int, rng: np.random.G
     return found
 
 
-_MOVED = (2.0, 3.5, 5.0, 6.5, 8.0, 10.0, 12.0)  # standard uncertainties
+_MOVED = (2.0, 3.5, 5.0, 6.5, 8.0, 10.0, 12.0, *np.arange(14.0, 62.0, 2.0))  # standard uncertainties
+_NEARLY, _APART = 12.0, 3.0  # of these, and of those over short windows: as far as a fit is looked beside
 _LESS = 0.5  # of the least rise of a parabola: below, there is another piece
 _MOVES = 4  # from minimum to minimum, at most
 _GAIN = 0.1  # of the sum of squares, in squares of the noise: less is the end of the iteration
@@ -211,7 +212,7 @@ def looked_beside(grown: Grown, finished: Callable[[Stage], Grown]) -> Grown:
         if better is None:
             break
         try:
-            grown = replace(finished(better), stuck=grown.stuck)
+            grown = replace(finished(better), stuck=grown.stuck, apart=grown.apart)
         except SolveError:
             break
     return replace(grown, doubted=tuple(dict.fromkeys(i for rise, i, _ in found if rise < BETTER)))
@@ -225,9 +226,12 @@ def _beside(grown: Grown) -> list[tuple[float, int, FloatArray]]:
     covariance = inverted(reduced(problem, state)[0] + u.precision)[0]
     least, found = problem.cost(theta, grown.starts, weights), []
     here = _transitions(problem, theta, grown.starts)
-    for i, error in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    reach = np.maximum(_NEARLY * errors, _APART * grown.apart if len(grown.apart) else 0.0)
+    for i, error in enumerate(errors):
         for side in (1.0, -1.0) if error > 0.0 else ():
-            fars = [side * far for far in _MOVED if u.low[i] <= theta[i] + side * far * error <= u.high[i]]
+            fars = [side * far for far in _MOVED if far * error <= reach[i]]
+            fars = [far for far in fars if u.low[i] <= theta[i] + far * error <= u.high[i]]
             places = {far: np.where(np.arange(len(theta)) == i, theta[i] + far * error, theta) for far in fars}
             if fars and not problem.steady and _transitions(problem, places[fars[-1]], grown.starts) == here:
                 fars = fars[-1:]  # the same piece as far as that
