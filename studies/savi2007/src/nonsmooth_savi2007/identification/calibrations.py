@@ -267,7 +267,7 @@ def stiffness(
     ]
     if mass:
         notes.append(f"the inertia of {mass:.4g} kg under the hand is put back")
-    number, ways = np.arange(len(runs)), (1.0, -1.0) if friction else (0.0,)
+    ways = (1.0, -1.0) if friction else (0.0,)
     loop = values[2] if friction else 0.0
     data = picture_data(
         runs,
@@ -275,15 +275,12 @@ def stiffness(
             "sample": {
                 "displacement": terms[:, 0],
                 "force": force,
-                "run": np.repeat(number, lengths),
                 "pull": np.sign(terms[:, 1]),
             },
             "line": {
                 "slope": np.full(len(runs) * len(ways), slope),
                 "slope_error": np.full(len(runs) * len(ways), error),
                 "intercept": np.add.outer(values[terms.shape[1] :], np.multiply(ways, loop)).ravel(),
-                "line_run": np.repeat(number, len(ways)),
-                "line_pull": np.tile(ways, len(runs)),
             },
         },
         **{key: one for key, one in others.items() if key == "friction_force"},

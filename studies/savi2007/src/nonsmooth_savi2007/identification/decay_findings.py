@@ -226,11 +226,6 @@ def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate,
         [part.run],
         {
             "peak": {"peak_time": at - begun, "peak_height": height, "peak_height_error": error},
-            "time": {
-                "time": part.time - begun,
-                "x": part.x - decay.rest,
-                "fitted": decay.fitted(which) - decay.rest,
-            },
             "fine_time": {
                 "fine_time": fine,
                 "envelope_both": envelope(fine, first, natural, b, f),
@@ -314,7 +309,6 @@ def support_damping(runs: Sequence[Run], *, test_mass: Quantity) -> tuple[Findin
                 "peak_height": height,
                 "log_height": np.log(height),
                 "log_height_error": error / height,
-                "used": np.ones(len(t), np.int8),
             },
         },
         intercept=intercept,

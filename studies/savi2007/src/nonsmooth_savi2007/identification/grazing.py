@@ -136,10 +136,8 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, kappa: float) -> Findin
                     "amplitude": seen.highest - place,
                     "amplitude_error": np.hypot(seen.error, seen.mean_error),
                     "contact": contact.astype(np.int8),
-                    "mean": seen.mean - place,
                 }
             },
-            grazing_setting=ends.mean(),
             grazing_low=ends.min(),
             grazing_high=ends.max(),
             gap=Estimate(gap, total, "m"),

@@ -376,12 +376,10 @@ def _data(found: ContactFit) -> xr.Dataset:
             "time": {
                 "time": time,
                 "x": x,
-                "x_error": np.full(len(x), run.resolution / np.sqrt(12)),
                 "fitted": fitted,
-                "residual": x - fitted,
                 "segment": segment,
                 "in_contact": (np.where(np.isfinite(fitted), fitted, -np.inf) > gap.value).astype(np.int8),
             }
         },
         gap=gap,
-    ).assign_attrs(run=run.name)
+    )

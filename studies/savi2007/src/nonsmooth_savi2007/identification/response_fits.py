@@ -104,9 +104,7 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
             "omega_fine": {"omega_fine": fine, "joint_amplitude": joint, "viscous_amplitude": plain},
         },
         c_joint=c_both,
-        friction_joint=dry,
         c_viscous=c_viscous,
-        crank_length=some.crank[0],
     )
     bias = 100 * (c_viscous.value / (mass.value * b) - 1)
     alone = {a: viscous_bias(natural, b, f, a, seen.omega[seen.crank == a]) for a in np.unique(seen.crank).tolist()}
@@ -335,15 +333,8 @@ def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> xr.Dataset
     return picture_data(
         seen.runs,
         {
-            "run": {
-                "omega": seen.omega,
-                "crank": seen.crank,
-                "real": ratio.real,
-                "imaginary": ratio.imag,
-                "error": seen.error / seen.crank,
-            },
+            "run": {"crank": seen.crank, "real": ratio.real, "imaginary": ratio.imag},
             ("crank_length", "omega_fine"): {"fitted_real": curves.real, "fitted_imaginary": curves.imag},
-            "omega_fine": {"omega_fine": fine},
             "crank_length": {"crank_length": lengths},
         },
         omega_0=rows[1],
