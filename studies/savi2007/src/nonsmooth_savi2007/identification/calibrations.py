@@ -137,7 +137,7 @@ def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | 
     length = np.array([run.crank for run in runs])
     force, error = np.zeros(len(runs)), np.zeros(len(runs))
     for i, run in enumerate(runs):
-        fitted, *_ = harmonics_of(run, run.force)
+        fitted = harmonics_of(run, run.force)
         force[i], error[i] = fitted.amplitudes[0], fitted.amplitude_errors[0]
     (slope, intercept), known, scattered, data = _calibrated(
         "crank lengths", runs, length, force, error, ("crank length", "m"), ("forcing amplitude", "N")

@@ -100,7 +100,12 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
     data = picture_data(
         some.runs,
         {
-            "run": some.curve,
+            "run": {
+                "omega": some.omega,
+                "amplitude": some.amplitude,
+                "amplitude_error": some.error,
+                "direction": [str(run.settings.get("direction", "up")) for run in some.runs],
+            },
             "omega_fine": {"omega_fine": fine, "joint_amplitude": joint, "viscous_amplitude": plain},
         },
         c_joint=c_both,

@@ -58,21 +58,6 @@ class Steady:
         return len(self.runs)
 
     @property
-    def direction(self) -> list[str]:
-        """``up`` for a run that was reached with rising frequency, else ``down``."""
-        return [str(run.settings.get("direction", "up")) for run in self.runs]
-
-    @property
-    def curve(self) -> dict[str, Any]:
-        """Amplitudes over frequency, as pictures show them."""
-        return {
-            "omega": self.omega,
-            "amplitude": self.amplitude,
-            "amplitude_error": self.error,
-            "direction": self.direction,
-        }
-
-    @property
     def samples(self) -> int:
         """Samples of all runs."""
         return sum(len(run.time) for run in self.runs)
@@ -93,19 +78,16 @@ class Steady:
         return Steady(tuple(self.runs[i] for i in rows), *(getattr(self, one.name)[rows] for one in fields(self)[1:]))
 
 
-def harmonics_of(run: Run, values: Any) -> tuple[HarmonicFit, float, float]:
-    """Harmonics of a channel of a run over whole turns; the drive's frequency, and the time of phase 0."""
-    time = values["time"].values
-    drive = run.drive
+def harmonics_of(run: Run, values: Any) -> HarmonicFit:
+    """Harmonics of a channel of a run over whole turns."""
+    time, drive = values["time"].values, run.drive
     whole = int(np.floor((time[-1] - time[0]) / drive.period))
     if whole < 2:
         raise ValueError(
             f"{run.label}: holds {whole} whole turns of the crank; a steady run needs two or more: record longer"
         )
     inside = time <= time[0] + whole * drive.period
-    fitted = harmonic_fit(time[inside], values[inside], drive.omega, HARMONICS)
-    # the gate's times to 0.1 ms each: all of them together tell the phase
-    return fitted, drive.omega, (drive.turn_times - drive.period * drive.turns).mean()
+    return harmonic_fit(time[inside], values[inside], drive.omega, HARMONICS)
 
 
 def steady(runs: Sequence[Run]) -> Steady:
@@ -119,15 +101,17 @@ def steady(runs: Sequence[Run]) -> Steady:
     rows: list[tuple[Any, ...]] = []
     order, turn = np.arange(1, HARMONICS + 1), np.linspace(0, 2 * np.pi, TURN, endpoint=False)
     for run in runs:
-        fitted, omega, mark = harmonics_of(run, run.x)
+        fitted, drive = harmonics_of(run, run.x), run.drive
+        # the gate's times to 0.1 ms each: all of them together tell the phase
+        mark = (drive.turn_times - drive.period * drive.turns).mean()
         amplitude, shape = fitted.amplitudes[0], np.multiply.outer(turn, order) - fitted.phases
         rows.append(
             (
-                omega,
+                drive.omega,
                 run.crank,
                 amplitude,
                 fitted.amplitude_errors[0],
-                amplitude * np.exp(1j * (omega * mark - fitted.phases[0])),
+                amplitude * np.exp(1j * (drive.omega * mark - fitted.phases[0])),
                 fitted.mean,
                 fitted.mean_error,
                 fitted.mean + (np.cos(shape) @ fitted.amplitudes).max(),
