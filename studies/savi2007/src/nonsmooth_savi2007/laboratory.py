@@ -7,7 +7,7 @@ Identification and comparison read the folders only.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -109,13 +109,7 @@ class Laboratory:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
         return load_session(self._write(name, made))
 
-    def with_support(self, session: Session, procedure: str) -> list[str]:
-        """The runs of a procedure in which the support was mounted."""
-        return [item.run for item in session.recordings(procedure) if "gap" in item.settings]
-
-    def measured(
-        self, session: Session, procedure: str, runs: str | Sequence[str]
-    ) -> tuple[xr.Dataset, dict[str, Any]]:
+    def measured(self, session: Session, procedure: str, runs: str | None = None) -> tuple[xr.Dataset, dict[str, Any]]:
         """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
         if session.folder not in self._references:  # once for all runs of a session: its decays are fitted for it
             offset = gap_offset(self.identified, self.session)

@@ -22,7 +22,7 @@ def _rise(settings: Settings) -> Datasets:
     bench, data = settings.bench, {}
     for duration in _SHORT if settings.quick else RISES:
         session = bench.record(f"fig11_{duration:g}_s", bench.rig.figure(11, duration=duration))
-        measured, set_ = bench.measured(session, "rise", bench.with_support(session, "rise"))
+        measured, set_ = bench.measured(session, "rise")
         values = np.linspace(*VARIED["fig11"].range, 121 if settings.quick else 301)
         compared = bench.compare(measured, set_, parameter="rho", direction="up", values=values)
         data[f"{duration:g}"] = compared.assign_attrs(rise=f"{duration:g} s")

@@ -54,9 +54,9 @@ def motions(bench: Laboratory, number: int) -> MeasuredMotions:
     values = [f"{setting[place]:g}" for setting in SECTIONS[number]]
     made = bench.rig.figure(number, periods=quick if bench.quick else whole)
     session, found = bench.record(f"fig{number:02d}", made), {}
-    for i, run in enumerate(bench.with_support(session, "section")):
+    for i, item in enumerate(session.recordings("section")):
         again, at = divmod(i, len(values))
-        found[values[at] + (f"_{again + 1}" if again else "")] = bench.measured(session, "section", run)
+        found[values[at] + (f"_{again + 1}" if again else "")] = bench.measured(session, "section", item.run)
     return found
 
 

@@ -122,7 +122,7 @@ def _caption(data: Datasets, printed: str) -> str:
 def _measure(settings: Settings, number: int) -> Datasets:
     bench = settings.bench
     session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **_steps(settings, number)))
-    measured, set_ = bench.measured(session, "response", bench.with_support(session, "response"))
+    measured, set_ = bench.measured(session, "response")
     return {"compared": bench.compare(measured, set_), "runs": as_result(measured, "response over frequency")}
 
 
