@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth_savi2007.bench import Measurement
-from nonsmooth_savi2007.study import figures_of_the_study
+from nonsmooth_savi2007.study import Measurement, figures_of_the_study
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="groups of processes are POSIX's")

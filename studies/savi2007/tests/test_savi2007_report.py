@@ -14,14 +14,13 @@ import xarray as xr
 import nonsmooth as ns
 from nonsmooth.recordings.session import load_session
 from nonsmooth_savi2007 import Reproduction, reproduce, study
-from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.claims.claims import CLAIMS
 from nonsmooth_savi2007.claims.verdicts import Verdict
 from nonsmooth_savi2007.figures.figure import finish, finished, just_made
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import Laboratory
 from nonsmooth_savi2007.printed import TABLE_1
-from nonsmooth_savi2007.study import figures_of_the_study
+from nonsmooth_savi2007.study import Measurement, figures_of_the_study
 
 NUMBERS = {2, *range(4, 19)}
 MEASURED = {*range(4, 15), 16, 17, 18}
