@@ -53,14 +53,13 @@ def records(
         rng, name = rig.generator(procedure, i), f"Run #{i + 1}"
         wander, period = rig.wander(procedure, i, omega), 2 * np.pi / omega
         gap = NO_SUPPORT if setting.gap is None else rig.true_gap(setting.gap)
-        set_to = rig.parameters(omega=omega, crank_length=setting.crank_length, g=gap) | wander
         before, phase = int(np.ceil(settle / period)), rng.uniform()
         # Whole periods in all, so that the next run can begin where this one ends.
         recorded = int(np.ceil(phase + (setting.duration + 1 / sensors.RATE) / period))
         time, at = sensors.instants(rig, rng, setting.duration)
         begin = (before + phase) * period
         (x, v), ended = simulated(
-            rig.system().with_parameters(set_to),
+            rig.system(omega=omega, crank_length=setting.crank_length, g=gap, **wander),
             name,
             instants=begin + at,
             turns=(before, recorded),

@@ -109,8 +109,7 @@ def rise(
     rng, name, true = rig.generator("rise", 0), "Run #1", rig.true_gap(screw)
     omega, rate = frequency(rig, knob), (last - first) / duration
     wander, period, side = rig.wander("rise", 0, omega), 2 * np.pi / omega, rig.truth["motor_side"]
-    set_to = rig.parameters(rising=True, omega=omega, g=true) | wander
-    system, start = rig.system(rising=True).with_parameters(set_to), {**at_rest(true), "a": first}
+    system, start = rig.system(rising=True, omega=omega, g=true, **wander), {**at_rest(true), "a": first}
     turns = 0, int(np.ceil(_SETTLE / period))
     _, settled = simulated(system, name, instants=np.array([0.0]), turns=turns, start=start, side=side)
     time, at = sensors.instants(rig, rng, duration)

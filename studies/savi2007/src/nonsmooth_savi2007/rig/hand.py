@@ -107,7 +107,7 @@ def impulse(
     duration: float = 20.0,
 ) -> Recording:
     """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each: Fig. 5."""
-    system = rig.system().with_parameters(rig.parameters(crank_length=0.0, g=NO_SUPPORT))
+    system = rig.system(crank_length=0.0, g=NO_SUPPORT)
     runs = []
     for i, velocity in enumerate(velocities):
         rng = rig.generator("impulse", i)

@@ -100,19 +100,20 @@ class VirtualRig:
 
     # The system
 
-    def system(self, *, rising: bool = False) -> System:
-        """The rig as a ``System`` with the truth's parameters; ``rising`` with the crank's length as a slow state."""
+    def system(self, *, rising: bool = False, **settings: float) -> System:
+        """The rig as a ``System`` with the truth's parameters and the settings of a run; ``rising`` with the crank's
+        length as a slow state."""
 
         side = int(self.truth["motor_side"])
         equations = car(relaxing=self.support_relaxation, rising=rising, wanders=self.wanders, side=side)
-        return equations.with_parameters(self.parameters(rising=rising))
+        return equations.with_parameters(self.parameters(rising=rising, **settings))
 
     @property
     def wanders(self) -> bool:
         """Return whether the motor's frequency wanders."""
         return self.truth["motor_wander"] > 0
 
-    def wander(self, procedure: str, run: int, omega: float) -> dict[str, float]:
+    def wander(self, procedure: str, run: int, omega: float) -> dict[str, Any]:
         """Parameters of the motor's slow terms in one run: periods of 2 to 60 s, the same part of the variance each."""
         if not self.wanders:
             return {}
@@ -129,9 +130,9 @@ class VirtualRig:
         values |= {"curvature": 1.0 / self.truth["string_length"], "omega": 4.5}
         return {**values, "crank_rate" if rising else "crank_length": 0.0, **settings}
 
-    def named_parameters(self, **settings: float) -> SimpleNamespace:
+    def named_parameters(self, **settings: Any) -> SimpleNamespace:
         """The same with the values as attributes, as the equations read them."""
-        return SimpleNamespace(**(self.parameters() | settings))
+        return SimpleNamespace(**self.parameters(**settings))
 
     def true_gap(self, reading: float) -> float:
         """The gap (m) where the support's screw reads ``reading``: its scale is right, its zero is not known."""
@@ -270,7 +271,7 @@ class LiveRig(SimulatedRig):
             raise ValueError("a motor that wanders has no phase to which a reference could be tied: motor_wander = 0")
         self._rig, at_rest = rig, rig.true_gap(figures.screw_for(rig, gap, crank_length))
         super().__init__(
-            rig.system().with_parameters(rig.parameters(omega=omega, crank_length=crank_length, g=at_rest)),
+            rig.system(omega=omega, crank_length=crank_length, g=at_rest),
             amplitude="crank_length",
             rate=sensors.RATE,
             resolution=sensors.COUNT if rig.quantisation else 0.0,
