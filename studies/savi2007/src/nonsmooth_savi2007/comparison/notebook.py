@@ -64,7 +64,7 @@ class GapReference(NamedTuple):
     """
 
     offset: GapOffset
-    places: MeanShift = MeanShift(0.0, 0.0, 0.0, np.zeros((3, 3)), np.zeros(3), 0)
+    places: MeanShift = MeanShift(0.0, 0.0, 0.0, np.zeros((3, 3)), np.zeros(3))
     direction: int = 1
     mark: float = 0.0
 

@@ -119,8 +119,8 @@ def identify(
     gap = None
     if chain.contacts is not None and chain.decay is not None:
         gap = refer(evidence, chain.decay, chain.contacts, adjusted, chain.seen, crank_length)
-        chain.findings.append(gap.finding(chain.contacts))
-        chain.say(*gap.notes, *gap.counted.notes)
+        chain.findings.append(gap.finding)
+        chain.say(*gap.notes)
     chain.checks(adjusted)
     chain.doubts(adjusted)
     found = joined(

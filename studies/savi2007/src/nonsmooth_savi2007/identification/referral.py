@@ -14,7 +14,6 @@ Where the car rests and about which place it swings comes from one function, :fu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,7 +41,7 @@ class MeanShift(NamedTuple):
     Three places are told apart: where the sensor counts zero, where the springs balance (``rest``; a car with dry
     friction stops within F_C/2k of it, and a sensor is zeroed where the car happens to stand), and the mean position
     under the drive. ``covariance`` is that of (rest, alpha, beta), ``by_zero`` how they move with the place of rest
-    that the taps tell; number of ``runs``; ``notes`` on what the runs say of the string.
+    that the taps tell; ``notes`` on what the runs say of the string.
     """
 
     rest: float
@@ -50,7 +49,6 @@ class MeanShift(NamedTuple):
     beta: float
     covariance: FloatArray
     by_zero: FloatArray
-    runs: int
     string_length: float | None = None
     notes: tuple[str, ...] = ()
 
@@ -134,7 +132,7 @@ def mean_shift(
             left = y - matrix @ found
             spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
         rest, curved, straight = found.tolist()
-        return MeanShift(rest, curved, straight, covariance, covariance[:, 0] * known[0], len(y), length)
+        return MeanShift(rest, curved, straight, covariance, covariance[:, 0] * known[0], length)
 
     free = fitted(None, 0.0, 2 * size if string_length else 0.25)
     error = np.sqrt(free.covariance[1, 1])
@@ -226,48 +224,20 @@ class Referred(NamedTuple):
 
     Attributes
     ----------
-    estimates : mapping of str to Estimate
-        ``g``, counted from the mean position under the drive, ``gap_at_rest``, from where the car rests,
+    finding : Finding
+        ``g``, counted from the mean position under the drive; ``others``: ``gap_at_rest``, from where the car rests,
         ``mean_shift``, the one less the other, and ``rest_position``, where the car rests in the sensor's count (m).
-    covariance : array (4, 4)
-        Of these four.
+        ``covariance`` is that of these four.
     cross : array (4, p)
-        With the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero and omega_0.
-    crank_length, reading : float
-        The crank to which the gap is referred, and the screw's reading that it stands for (m).
-    counted : CountedGap
-        The gap in the sensor's count.
+        Covariance with the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero
+        and omega_0.
+    notes : tuple of str
+        What the runs say of the string, and which of them are left out.
     """
 
-    estimates: Mapping[str, Estimate]
-    covariance: FloatArray
+    finding: Finding
     cross: FloatArray
-    crank_length: float
-    reading: float
-    counted: CountedGap
-    notes: tuple[str, ...] = ()
-
-    def finding(self, contacts: ContactFit) -> Finding:
-        """The gap as a finding."""
-        gap, at_rest, shift, _ = self.estimates.values()
-        notes = [
-            f"counted from the mean position under the drive at a crank of {1e3 * self.crank_length:.2f} mm, "
-            f"{1e6 * shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
-            "the model would stand at another gap by as much",
-            f"stands for a reading of {1e3 * self.reading:.4g} mm at the screw, whose zero is off by "
-            f"{1e6 * (at_rest.value - self.reading):+.0f} µm",
-            *self.counted.notes,
-        ]
-        return Finding(
-            "g",
-            gap,
-            "multiple shooting over records with contact, referred to the mean position",
-            contacts.samples,
-            tuple(run.name for run in contacts.runs),
-            tuple(notes),
-            {name: one for name, one in self.estimates.items() if name != "g"},
-            self.covariance,
-        )
+    notes: tuple[str, ...]
 
 
 def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: float | None = None) -> MeanShift:
@@ -350,10 +320,28 @@ def refer(
         name: Estimate(value, np.sqrt(square), "m")
         for name, value, square in zip(names, values, np.diag(covariance), strict=True)
     }
+    gap, at_rest, shift, _ = estimates.values()
+    finding = Finding(
+        "g",
+        gap,
+        "multiple shooting over records with contact, referred to the mean position",
+        contacts.samples,
+        tuple(run.name for run in contacts.runs),
+        (
+            f"counted from the mean position under the drive at a crank of {1e3 * crank:.2f} mm, "
+            f"{1e6 * shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
+            "the model would stand at another gap by as much",
+            f"stands for a reading of {1e3 * reading:.4g} mm at the screw, whose zero is off by "
+            f"{1e6 * (at_rest.value - reading):+.0f} µm",
+            *counted.notes,
+        ),
+        {name: one for name, one in estimates.items() if name != "g"},
+        covariance,
+    )
     with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.places] @ counted.weight)
     with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
     cross = rows @ np.array([with_counted, *np.outer(found.by_zero, with_zero)])
-    return Referred(estimates, covariance, cross, crank, reading, counted, found.notes)
+    return Referred(finding, cross, (*found.notes, *counted.notes))
 
 
 def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:

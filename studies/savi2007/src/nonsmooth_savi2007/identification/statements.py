@@ -170,8 +170,10 @@ def joined(
         row = omega / 2 * (unit[names.index("k")] / adjusted["k"] - unit[names.index("m")] / adjusted["m"])
         told["omega_0"] = Estimate(omega, np.sqrt(row @ matrix @ row), "rad/s"), row
     if gap is not None:
-        matrix[size:, :size], matrix[:size, size:], matrix[size:, size:] = gap.cross, gap.cross.T, gap.covariance
-        told |= {name: (one, row) for (name, one), row in zip(gap.estimates.items(), unit[size:], strict=True)}
+        found = gap.finding
+        matrix[size:, :size], matrix[:size, size:], matrix[size:, size:] = gap.cross, gap.cross.T, found.covariance
+        estimates = {found.name: found.estimate, **found.others}
+        told |= {name: (one, row) for (name, one), row in zip(estimates.items(), unit[size:], strict=True)}
     inner, outer = ([name for name in some if name in told] for some in (_RESTS_ON, _BESIDE))
     jacobian = np.array([told[name][1] for name in (*inner, *outer)])
     return ParameterSet(
