@@ -195,18 +195,10 @@ class _Chain:
             warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
     def doubts(self, adjusted: Adjusted) -> None:
-        """Anomalies: impossible values, disagreements, and procedures of which most runs could not be used."""
-        self.unused()
-        self.say(*filter(None, [disagreement(adjusted), *impossible(adjusted)]), doubts=True)
-        if self.contacts is not None and self.contacts.poor:
-            self.say(
-                f"contact: the motion is not that of the model: residuals {self.contacts.excess:.3g} times the "
-                "sensor's noise. Look at the crank's length, the photogate and the gap of these runs",
-                doubts=True,
-            )
+        """Anomalies: impossible values, disagreements, and procedures of which most runs could not be used.
 
-    def unused(self) -> None:
-        """Name the runs that no finding rests on; where they are most of a procedure, that is an anomaly."""
+        Runs that no finding rests on are named; where they are most of a procedure, that is an anomaly.
+        """
         for procedure, names in _FOUND_BY.items():
             used = {name for finding in self.findings if finding.name in names for name in finding.runs}
             given = [run.name for run in self.runs[procedure]]
@@ -218,6 +210,13 @@ class _Chain:
                 self.say(sentence, doubts=True)
             elif any(not any(procedure in note and repr(name) in note for note in self.notes) for name in idle):
                 self.say(sentence)
+        self.say(*filter(None, [disagreement(adjusted), *impossible(adjusted)]), doubts=True)
+        if self.contacts is not None and self.contacts.poor:
+            self.say(
+                f"contact: the motion is not that of the model: residuals {self.contacts.excess:.3g} times the "
+                "sensor's noise. Look at the crank's length, the photogate and the gap of these runs",
+                doubts=True,
+            )
 
     def motor(self) -> None:
         """Say where the photogate sees the motor's frequency wander."""
@@ -288,17 +287,13 @@ class _Chain:
                 lambda: grazing_gap(runs, decay, kappa=rough["k_s"] / rough["m"]),
             )
 
-    def mark(self, decay: DecayFit) -> float:
-        """The crank's angle at the photogate (rad), from steady runs without support or the first ones of the graze."""
-        angle, note = mark_of(self.seen if len(self.seen) else steady(self.runs["grazing"][:4]), decay)
-        if note:
-            self.say(note)
-        return angle
-
     def contact(self) -> Finding | None:
         """Fit the runs with contact; what one contact tells by itself."""
         runs, rough, decay = self.runs["contact"], self.adjusted(), self.decay
-        mark = 0.0 if decay is None else self.mark(decay)
+        mark = 0.0
+        if decay is not None:  # by steady runs without support, or the first ones of the graze
+            mark, note = mark_of(self.seen if len(self.seen) else steady(self.runs["grazing"][:4]), decay)
+            self.say(*filter(None, [note]))
         if not runs:
             return None
         if decay is None or "k_s" not in rough.names:

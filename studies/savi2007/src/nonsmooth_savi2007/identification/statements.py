@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -141,16 +141,7 @@ def require(found: ParameterSet, names: Iterable[str]) -> None:
 _BESIDE = ("friction", "gain", "omega_0", "gap_at_rest", "mean_shift", "rest_position")
 
 
-def joined(
-    adjusted: Adjusted,
-    gap: Referred | None,
-    *,
-    findings: Sequence[Finding],
-    identifiability: Mapping[str, str],
-    notes: Sequence[str],
-    synthetic: bool,
-    anomalies: Sequence[str] = (),
-) -> ParameterSet:
+def joined(adjusted: Adjusted, gap: Referred | None, **beside: Any) -> ParameterSet:
     """The model's parameters, then what is beside them: rows over the unknowns of the adjustment, and the gap as it is.
 
     Parameters
@@ -158,8 +149,8 @@ def joined(
     adjusted : Adjusted
     gap : Referred, optional
         With its covariance with the unknowns.
-    findings, identifiability, notes, anomalies, synthetic
-        Of the :class:`ParameterSet`.
+    **beside
+        What the :class:`ParameterSet` holds beside the numbers: findings, notes and the like.
     """
     names, size = adjusted.names, len(adjusted.names)
     matrix, unit = np.zeros((size + 4, size + 4)), np.eye(size + 4)
@@ -180,9 +171,5 @@ def joined(
         {name: told[name][0] for name in inner},
         jacobian @ matrix @ jacobian.T,
         extra={name: told[name][0] for name in outer},
-        findings=findings,
-        identifiability=identifiability,
-        notes=notes,
-        anomalies=anomalies,
-        synthetic=synthetic,
+        **beside,
     )
