@@ -57,15 +57,6 @@ def write_report(
     complete: bool,
 ) -> None:
     """Write ``REPORTS`` into the folder that holds the figures."""
-    blocks = _blocks(folder, figures, data, rows, settings, complete)
-    text = json.dumps([asdict(row) | {"reason": row.reason} for row in rows], indent=1, ensure_ascii=False)
-    for name, content in zip(REPORTS, (text + "\n", to_markdown(blocks), to_html(blocks, TITLE)), strict=True):
-        (folder / name).write_text(content, encoding="utf-8")
-
-
-def _blocks(
-    folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Statement], settings: Settings, complete: bool
-) -> list[Written]:
     blocks = [heading(TITLE, 1), paragraph(_PAPER)]
     if settings.quick:
         blocks.append(notice("A quick run: coarse grids and short transients. Verdicts are provisional."))
@@ -99,7 +90,10 @@ def _blocks(
     if any(figure.rig for figure in figures):
         blocks.append(paragraph(_ABOUT_THE_RIG))
     blocks += [heading("What the paper leaves open"), bullets(_OPEN)]
-    return [*blocks[:first], contents(blocks), *blocks[first:]]
+    blocks.insert(first, contents(blocks))
+    text = json.dumps([asdict(row) | {"reason": row.reason} for row in rows], indent=1, ensure_ascii=False)
+    for name, content in zip(REPORTS, (text + "\n", to_markdown(blocks), to_html(blocks, TITLE)), strict=True):
+        (folder / name).write_text(content, encoding="utf-8")
 
 
 def _counts(rows: Sequence[Statement]) -> dict[str, dict[Verdict, int]]:
