@@ -36,7 +36,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import xarray as xr
 from scipy.optimize import minimize_scalar
 from scipy.signal import zoom_fft
 
@@ -194,6 +193,23 @@ def decay_damping(decay: DecayFit, mass: Quantity) -> Finding:
         for value, variance, unit in zip(decay.law[1:], np.diag(covariance), ("N s/m", "N"), strict=True)
     )
     related = own[0, 1] / np.sqrt(own[0, 0] * own[1, 1]) if own[1, 1] else 0.0
+    widest = max(range(len(peaks)), key=lambda i: np.ptp(decay.parts[i].x))
+    at, height, error = peaks[widest]
+    slope, intercept, _ = decay_rate(at, height, error)
+    fine = np.linspace(0.0, at[-1] - at[0], 200)
+    data = picture_data(
+        [decay.parts[widest].run],
+        {
+            "peak": {"peak_time": at - at[0], "peak_height": height, "peak_height_error": error},
+            "fine_time": {
+                "fine_time": fine,
+                "envelope_both": envelope(fine, height[0], *decay.law),
+                "envelope_viscous": np.exp(intercept + slope * (at[0] + fine)),
+            },
+        },
+        c=c,
+        friction_force=friction,
+    )
     return Finding(
         "c_decay",
         c,
@@ -208,32 +224,8 @@ def decay_damping(decay: DecayFit, mass: Quantity) -> Finding:
         ),
         {"friction": friction, "c_viscous_only": plain},
         covariance,
-        _data(decay, peaks, c, friction),
+        data,
         "free_decay",
-    )
-
-
-def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate, friction: Estimate) -> xr.Dataset:
-    """The widest decay with its turning points and both envelopes."""
-    natural, b, f = decay.law
-    which = max(range(len(peaks)), key=lambda i: np.ptp(decay.parts[i].x))
-    part, (at, height, error) = decay.parts[which], peaks[which]
-    slope, intercept, _ = decay_rate(at, height, error)
-    begun, first = at[0], height[0]
-    fine = np.linspace(0.0, at[-1] - begun, 200)
-    plain = np.exp(intercept + slope * (begun + fine))
-    return picture_data(
-        [part.run],
-        {
-            "peak": {"peak_time": at - begun, "peak_height": height, "peak_height_error": error},
-            "fine_time": {
-                "fine_time": fine,
-                "envelope_both": envelope(fine, first, natural, b, f),
-                "envelope_viscous": plain,
-            },
-        },
-        c=c,
-        friction_force=friction,
     )
 
 

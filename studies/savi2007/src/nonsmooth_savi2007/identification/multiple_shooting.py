@@ -28,7 +28,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from scipy.linalg import block_diag
 from scipy.special import ndtri
 
@@ -301,6 +300,14 @@ def contact_finding(found: ContactFit, mass: Quantity | Estimate) -> Finding:
         for note in (*one.notes, *one.anomalies)
         if note.startswith(("left out", "the fit stands"))
     ]
+    longest = int(np.argmax([one.residuals.sizes["sample"] for one in found.fits]))
+    run, fitted_of = found.runs[longest], found.fits[longest].residuals
+    gap = found.estimate(found.place(longest, 0), "m")
+    fitted, segment = np.full(len(run.time), np.nan), np.full(len(run.time), -1)
+    at = np.searchsorted(run.time, fitted_of["time"].values)
+    fitted[at], segment[at] = fitted_of["fitted"].values, fitted_of["window"].values
+    touching = (np.where(np.isfinite(fitted), fitted, -np.inf) > gap.value).astype(np.int8)
+    columns = {"time": run.time, "x": run.positions, "fitted": fitted, "segment": segment, "in_contact": touching}
     return Finding(
         "c_s_contact",
         found.estimate(4, logarithmic=True).times(mass.value, mass.uncertainty, "N s/m"),
@@ -309,7 +316,7 @@ def contact_finding(found: ContactFit, mass: Quantity | Estimate) -> Finding:
         tuple(run.name for run in found.runs),
         tuple(notes),
         {"k_s": found.estimate(3).times(mass.value, mass.uncertainty, "N/m"), **gaps},
-        data=_data(found),
+        data=picture_data([run], {"time": columns}, gap=gap),
         plot="multiple_shooting",
     )
 
@@ -358,28 +365,4 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, kappa_error:
         (f"{limits}; the window is the median one of {len(alone)}",),
         data=shown.assign_attrs(parameter="c_s", units="N s/m", synthetic="yes" if run.synthetic else "no"),
         plot="profile",
-    )
-
-
-def _data(found: ContactFit) -> xr.Dataset:
-    """The longest run, sample by sample."""
-    which = int(np.argmax([one.residuals.sizes["sample"] for one in found.fits]))
-    run, fitted_of = found.runs[which], found.fits[which].residuals
-    time, x = run.time, run.positions
-    fitted, segment = np.full(len(x), np.nan), np.full(len(x), -1)
-    at = np.searchsorted(time, fitted_of["time"].values)
-    fitted[at], segment[at] = fitted_of["fitted"].values, fitted_of["window"].values
-    gap = found.estimate(found.place(which, 0), "m")
-    return picture_data(
-        [run],
-        {
-            "time": {
-                "time": time,
-                "x": x,
-                "fitted": fitted,
-                "segment": segment,
-                "in_contact": (np.where(np.isfinite(fitted), fitted, -np.inf) > gap.value).astype(np.int8),
-            }
-        },
-        gap=gap,
     )

@@ -24,7 +24,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from scipy.optimize import least_squares
 
 from nonsmooth import SolveError
@@ -235,6 +234,10 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> Finding:
         moved = _complex_fit(seen.only(longest), decay)[0] - values
         covariance = covariance + np.outer(moved, moved)
         doubt = "; how far the fit moves with the longest crank alone is added to it"
+    b, natural, *others = values.tolist()
+    fine, lengths = np.linspace(seen.omega.min(), seen.omega.max(), 400), np.unique(seen.crank)
+    curves = np.array([receptance(fine, a, natural, b, *others) / a for a in lengths])
+    ratio = seen.response / seen.crank
     factor = np.array([mass.value, 1.0, mass.value, 1.0, 1.0])
     by_mass = mass.uncertainty * values * [1, 0, 1, 0, 0]
     values, covariance = factor * values, covariance * np.outer(factor, factor) + np.outer(by_mass, by_mass)
@@ -253,7 +256,16 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> Finding:
         ),
         dict(zip(("omega_0", "friction", "drive_scale", "mark"), rows[1:], strict=True)),
         covariance,
-        _complex_data(seen, rows, mass.value),
+        picture_data(
+            seen.runs,
+            {
+                "run": {"crank": seen.crank, "real": ratio.real, "imaginary": ratio.imag},
+                ("crank_length", "omega_fine"): {"fitted_real": curves.real, "fitted_imaginary": curves.imag},
+                "crank_length": {"crank_length": lengths},
+            },
+            omega_0=rows[1],
+            c=rows[0],
+        ),
         "nyquist",
     )
 
@@ -328,23 +340,6 @@ def crank_mark(seen: Steady, decay: DecayFit) -> float:
     half a turn.
     """
     return np.angle(np.sum(seen.response * np.conj(receptance(seen.omega, seen.crank, *decay.law))))
-
-
-def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> xr.Dataset:
-    c, natural, friction, scale, mark = (row.value for row in rows)
-    fine, lengths = np.linspace(seen.omega.min(), seen.omega.max(), 400), np.unique(seen.crank)
-    curves = np.array([receptance(fine, a, natural, c / mass, friction / mass, scale, mark) / a for a in lengths])
-    ratio = seen.response / seen.crank
-    return picture_data(
-        seen.runs,
-        {
-            "run": {"crank": seen.crank, "real": ratio.real, "imaginary": ratio.imag},
-            ("crank_length", "omega_fine"): {"fitted_real": curves.real, "fitted_imaginary": curves.imag},
-            "crank_length": {"crank_length": lengths},
-        },
-        omega_0=rows[1],
-        c=rows[0],
-    )
 
 
 def _enough(seen: Steady, least: int) -> None:
