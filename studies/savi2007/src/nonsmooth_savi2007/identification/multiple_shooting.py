@@ -206,7 +206,9 @@ def shoot_contacts(
         If no run can be fitted.
     """
     rows: list[tuple[Run, ParameterSet, ParameterSet, FloatArray]] = []
-    left, touched = [], [run for run in runs if _touches(run, decay.rest)]
+    # those near enough to the support: the screw's reading may be off by a millimetre
+    reach = {run: run.gap - 1e-3 if run.gap < 2e-3 else 0.5 * run.gap for run in runs}
+    left, touched = [], [run for run in runs if run.positions.max() > decay.rest + reach[run]]
     if not touched:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     for run in touched:
@@ -250,11 +252,6 @@ def shoot_contacts(
         tuple(left),
         poor,
     )
-
-
-def _touches(run: Run, rest: float) -> bool:
-    """Return whether the car comes near enough to the support: the screw's reading may be off by a millimetre."""
-    return run.positions.max() > rest + (run.gap - 1e-3 if run.gap < 2e-3 else 0.5 * run.gap)
 
 
 def _excess(found: ParameterSet, decay: DecayFit) -> float:

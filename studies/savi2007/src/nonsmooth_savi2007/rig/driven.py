@@ -36,11 +36,6 @@ class SteadyRun(NamedTuple):
     notes: Mapping[str, Any] = MappingProxyType({})
     release: float | None = None
 
-    def stated(self) -> dict[str, Any]:
-        """The settings as they go into the notebook."""
-        gap = {} if self.gap is None else {"gap": self.gap}
-        return {"crank_length": self.crank_length, "voltage": self.voltage, **gap, **self.notes}
-
 
 def records(
     rig: VirtualRig, procedure: str, settings: Sequence[SteadyRun], *, settle: float = 20.0, carry: bool = False
@@ -68,7 +63,9 @@ def records(
         )
         last = ended if carry else None
         crossed = passages(rig, omega, begin, begin + setting.duration, **wander) - begin
-        runs.append((name, rig.channels(rng, name, time, x, v, crossed=crossed), setting.stated()))
+        stated = {"crank_length": setting.crank_length, "voltage": setting.voltage, **setting.notes}
+        stated |= {} if setting.gap is None else {"gap": setting.gap}
+        runs.append((name, rig.channels(rng, name, time, x, v, crossed=crossed), stated))
     return rig.recording(procedure, runs)
 
 

@@ -134,21 +134,17 @@ def switched(truth: Mapping[str, float], given: Mapping[str, Any], off: Iterable
         result[name] = float(value)
     for feature in off:
         result |= FEATURES[feature]
-    _check(result)
-    return result
-
-
-def _check(truth: Mapping[str, float]) -> None:
-    for name, value in truth.items():
+    for name, value in result.items():
         kind = _TABLE[name][2]
         if not math.isfinite(value) and not (name == "string_length" and value == math.inf):
             raise ValueError(f"truth[{name!r}] = {value!r} must be finite")
         if not _ALLOWED[kind](value):
             raise ValueError(f"truth[{name!r}] = {value!r} must be {kind}")
-    if not 0 <= truth["motor_wander"] <= 0.05:
-        raise ValueError(f"truth['motor_wander'] = {truth['motor_wander']!r} must lie between 0 and 0.05 (relative)")
-    if truth["ripple"] >= 1:
-        raise ValueError(f"truth['ripple'] = {truth['ripple']!r}: from 1 on the motor would turn back")
+    if not 0 <= result["motor_wander"] <= 0.05:
+        raise ValueError(f"truth['motor_wander'] = {result['motor_wander']!r} must lie between 0 and 0.05 (relative)")
+    if result["ripple"] >= 1:
+        raise ValueError(f"truth['ripple'] = {result['ripple']!r}: from 1 on the motor would turn back")
+    return result
 
 
 def load_truth(path: str | os.PathLike[str]) -> dict[str, float]:
