@@ -48,8 +48,25 @@ class Marcher:
         drive: Driven | None = None,
     ) -> SampledRun | None:
         """March from (begin, z, mode) to the samples; None where the run does not come to its end."""
+
+        def marched() -> SampledRun | None:
+            period = self.system.period_at(values)
+            n_u = len(self.traced.u)
+            whole = 0.0 if period is None else float(np.floor(begin / period))
+            state = State(z[:n_u].copy(), z[n_u:].copy())
+            state.clock[:2] = (begin, 0.0) if period is None else (begin - whole * period, whole)
+            state.counters[0] = mode
+            if self._tables[0] != values.tobytes():  # many windows at the same parameters
+                self._tables = values.tobytes(), self.engine.prepare(values[None, :])
+            course = None
+            if drive is not None:
+                course = drive.at(dict(zip(self.traced.parameter_names, values.tolist(), strict=True)))
+            run = sampled(self.engine, self._tables[1], state, begin, times, course, STEPS)
+            good = run.log.status in (codes.OK, codes.NOT_GUARANTEED) and np.isfinite(run.z).all()
+            return run if good else None
+
         key = values.tobytes(), begin, times.tobytes(), z.tobytes(), mode, drive
-        return self.once(key, len(times), lambda: self._marched(values, begin, times, z, mode, drive))
+        return self.once(key, len(times), marched)
 
     def differentiated(self, values: FloatArray, motion: SampledRun) -> SampledRun | None:
         """The motion with its derivatives; None where they are not known: of a start at which several contacts are
@@ -71,21 +88,3 @@ class Marcher:
         while len(self._kept) * size > KEPT:
             del self._kept[next(iter(self._kept))]
         return found
-
-    def _marched(
-        self, values: FloatArray, begin: float, times: FloatArray, z: FloatArray, mode: int, drive: Driven | None
-    ) -> SampledRun | None:
-        period = self.system.period_at(values)
-        n_u = len(self.traced.u)
-        whole = 0.0 if period is None else float(np.floor(begin / period))
-        state = State(z[:n_u].copy(), z[n_u:].copy())
-        state.clock[:2] = (begin, 0.0) if period is None else (begin - whole * period, whole)
-        state.counters[0] = mode
-        if self._tables[0] != values.tobytes():  # many windows at the same parameters
-            self._tables = values.tobytes(), self.engine.prepare(values[None, :])
-        course = None
-        if drive is not None:
-            course = drive.at(dict(zip(self.traced.parameter_names, values.tolist(), strict=True)))
-        run = sampled(self.engine, self._tables[1], state, begin, times, course, STEPS)
-        good = run.log.status in (codes.OK, codes.NOT_GUARANTEED) and np.isfinite(run.z).all()
-        return run if good else None

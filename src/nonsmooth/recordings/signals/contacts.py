@@ -207,7 +207,33 @@ def contacts(
                 break
             found = smooth(t, values, resolution=resolution, contacts=inside)
             place = _support(found, omega, resolution)
-    return _labelled(found, place, 3.0 * resolution if least_depth is None else least_depth, x)
+    gap, gap_error, stiffness = place
+    position, least = found["x"].values, 3.0 * resolution if least_depth is None else least_depth
+    if math.isnan(gap):
+        begin, end, cut = np.zeros(0), np.zeros(0), np.zeros(0, np.bool_)
+    else:
+        begin, end, cut = intervals(found, gap)
+    speed, own = (np.interp([begin, end], t, found[name].values) for name in ("v", "x_error"))
+    errors = np.hypot(own, gap_error) / np.maximum(np.abs(speed), 1e-300)
+    first, behind = np.searchsorted(t, begin), np.searchsorted(t, end, "right")
+    deepest = [position[a:b].max(initial=-math.inf) - gap for a, b in zip(first, behind, strict=True)]
+    depth = np.where(behind > first, deepest, 0.25 * (end - begin) * np.abs(speed[0]))
+    unit = unit_of(x)
+    return xr.Dataset(
+        {
+            "begin": labelled("contact", begin, "begin of the contact", "s"),
+            "end": labelled("contact", end, "end of the contact", "s"),
+            "begin_error": ("contact", errors[0], {"units": "s"}),
+            "end_error": ("contact", errors[1], {"units": "s"}),
+            "depth": labelled("contact", depth, "depth of the contact", unit),
+            "v_begin": labelled("contact", speed[0], "velocity at the begin", f"{unit}/s"),
+            "v_end": labelled("contact", speed[1], "velocity at the end", f"{unit}/s"),
+            "uncertain": labelled("contact", (depth < least) | (behind - first < 2) | cut, "contact is uncertain"),
+            "gap": ((), gap, {"units": unit}),
+            "gap_error": ((), gap_error, {"units": unit}),
+            "stiffness": labelled((), stiffness, "stiffness of the support by the mass", "1/s^2"),
+        }
+    )
 
 
 def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple[float, float, float]:
@@ -296,33 +322,3 @@ def intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, Bo
     cut = ((begin == t[0]) & (x[0] > gap)) | ((end == t[-1]) & (x[-1] > gap))
     keep = begin < end
     return begin[keep], end[keep], cut[keep]
-
-
-def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float, x: Any) -> xr.Dataset:
-    gap, gap_error, stiffness = place
-    t, position = found["time"].values, found["x"].values
-    if math.isnan(gap):
-        begin, end, cut = np.zeros(0), np.zeros(0), np.zeros(0, np.bool_)
-    else:
-        begin, end, cut = intervals(found, gap)
-    speed, own = (np.interp([begin, end], t, found[name].values) for name in ("v", "x_error"))
-    errors = np.hypot(own, gap_error) / np.maximum(np.abs(speed), 1e-300)
-    first, behind = np.searchsorted(t, begin), np.searchsorted(t, end, "right")
-    deepest = [position[a:b].max(initial=-math.inf) - gap for a, b in zip(first, behind, strict=True)]
-    depth = np.where(behind > first, deepest, 0.25 * (end - begin) * np.abs(speed[0]))
-    unit = unit_of(x)
-    return xr.Dataset(
-        {
-            "begin": labelled("contact", begin, "begin of the contact", "s"),
-            "end": labelled("contact", end, "end of the contact", "s"),
-            "begin_error": ("contact", errors[0], {"units": "s"}),
-            "end_error": ("contact", errors[1], {"units": "s"}),
-            "depth": labelled("contact", depth, "depth of the contact", unit),
-            "v_begin": labelled("contact", speed[0], "velocity at the begin", f"{unit}/s"),
-            "v_end": labelled("contact", speed[1], "velocity at the end", f"{unit}/s"),
-            "uncertain": labelled("contact", (depth < least) | (behind - first < 2) | cut, "contact is uncertain"),
-            "gap": ((), gap, {"units": unit}),
-            "gap_error": ((), gap_error, {"units": unit}),
-            "stiffness": labelled((), stiffness, "stiffness of the support by the mass", "1/s^2"),
-        }
-    )
