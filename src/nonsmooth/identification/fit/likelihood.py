@@ -28,15 +28,15 @@ from nonsmooth.recordings.signals.sections import first_zero
 from nonsmooth.results.progress import Progress, progress
 
 
-def limits_of(values: FloatArray, rise: FloatArray, best: float, *, level: float = 0.95) -> tuple[float, float]:
-    """Limits of a parameter at this level, by its rising values and the rise of chi^2 above its least, at ``best``.
+def limits_of(values: FloatArray, rise: FloatArray, best: float) -> tuple[float, float]:
+    """Limits of a parameter at 95 %, by its rising values and the rise of chi^2 above its least, at ``best``.
 
-    A limit is NaN where chi^2 does not rise to 3.84 (95 %) within the values: the data do not bound the parameter
+    A limit is NaN where chi^2 does not rise to 3.84 within the values: the data do not bound the parameter
     there.
     """
     from scipy.stats import chi2
 
-    beyond, middle = rise - chi2.ppf(level, 1), int(np.argmin(np.abs(values - best)))
+    beyond, middle = rise - chi2.ppf(0.95, 1), int(np.argmin(np.abs(values - best)))
     return first_zero(values[middle::-1], beyond[middle::-1]), first_zero(values[middle:], beyond[middle:])
 
 
