@@ -39,7 +39,7 @@ from nonsmooth_savi2007.measure import (
     regimes,
     separation_rate,
 )
-from nonsmooth_savi2007.printed import FIGURE_14, FIGURE_17_TEXT, NUMBERS
+from nonsmooth_savi2007.printed import FIGURE_14, FIGURE_17_TEXT, NUMBERS, Printed
 
 
 def f11(data: Data) -> Iterator[Statement]:
@@ -66,7 +66,7 @@ def f11(data: Data) -> Iterator[Statement]:
         edges,
         f"No period up to 16 at {(inside == APERIODIC).sum()} of {len(inside)} values below; windows of "
         f"period {', '.join(map(str, windows)) or '(none)'} between.",
-    ).measured(_below(rise, printed.value, str(printed)))
+    ).measured(_below(rise, printed))
 
 
 def _chaos_from(swept: xr.Dataset) -> Interval | None:
@@ -113,14 +113,14 @@ def _flip(data: Data, rise: xr.Dataset, n: int) -> Cell:
     return printed_cell(printed, found, why=" ".join(words))
 
 
-def _below(rise: xr.Dataset, end: float, words: str) -> Cell:
+def _below(rise: xr.Dataset, end: Printed) -> Cell:
     """The most frequent period number of the rig's turns at a smaller forcing."""
-    numbers = rise["measured_period_number"].values[rise["measured_rho"].values < end]
+    numbers = rise["measured_period_number"].values[rise["measured_rho"].values < end.value]
     if not len(numbers):
-        return Cell(f"no turn below {words}")
+        return Cell(f"no turn below {end}")
     kinds, counts = np.unique(numbers, return_counts=True)
     kind, share = kinds[counts.argmax()], 100 * counts.max() / counts.sum()
-    return Cell(f"{period_word(kind)} in {share:.0f} % of the turns below {words}", agreed(kind == APERIODIC))
+    return Cell(f"{period_word(kind)} in {share:.0f} % of the turns below {end}", agreed(kind == APERIODIC))
 
 
 def f13(data: Data) -> Iterator[Statement]:

@@ -231,7 +231,7 @@ def session_measurement(
         reference = gap_reference(session, referred=referred, offset=gap_offset)
     # The crank of a rise grows, and the mean position moves with it: it is referred point by point.
     shift = 0.0 if shows == "diagram" else reference.mean(length)[0]
-    counts = int(float(apparatus["counts_per_turn"])) if "counts_per_turn" in apparatus else 1440
+    counts = int(float(apparatus.get("counts_per_turn", 1440)))
     travel = reference.direction * float(apparatus["distance_per_turn"])
     motions = [
         measured_motion(
