@@ -76,8 +76,8 @@ def grazing(one: Picture, finding: Any) -> None:
     Parameters
     ----------
     finding
-        A gap from grazing, or its data: ``setting``, ``amplitude``, ``contact`` over ``run``; ``grazing_setting``,
-        ``grazing_low``, ``grazing_high``, ``gap``.
+        A gap from grazing, or its data: ``setting``, ``amplitude``, ``contact`` over ``run``; ``grazing_low``,
+        ``grazing_high``, ``gap``.
     ax
         Where to draw; a new one-column figure if None.
     """
@@ -96,8 +96,8 @@ def multiple_shooting(one: Picture, finding: Any, *, seconds: Positive = 6.0) ->
     Parameters
     ----------
     finding
-        Contact parameters from multiple shooting, or their data: ``x``, ``fitted``, ``residual``, ``segment``,
-        ``in_contact`` over ``time``; ``gap``.
+        Contact parameters from multiple shooting, or their data: ``x``, ``fitted``, ``segment``, ``in_contact`` over
+        ``time``; ``gap``.
     ax
         Where to draw; a new one-column figure if None.
     seconds
@@ -118,7 +118,7 @@ def multiple_shooting(one: Picture, finding: Any, *, seconds: Positive = 6.0) ->
     if "in_contact" in data:
         style.shade(one.ax, time, data["in_contact"].values.astype(bool), alpha=0.3, label="contact", zorder=0)
     one.level(number(data, "gap"), one.text("gap", "mm", 1e3, "$g$ = "))
-    one.residual(time, data["residual"].values if "residual" in data else x - fitted)
+    one.residual(time, x - fitted)
 
 
 @picture("", _TIME, loc="upper right")
