@@ -30,7 +30,7 @@ def test_places_between_are_looked_at_where_the_farthest_is_of_another_piece(
         unknowns=unknowns, pieces=[None], steady=(), marched=motion, cost=cost, residuals=lambda *_: None
     )
     problem.weights = lambda state: state
-    found = likelihood._beside(SimpleNamespace(problem=problem, theta=np.zeros(1), starts=[None]))
+    found = likelihood._beside(SimpleNamespace(problem=problem, theta=np.zeros(1), starts=[None], apart=np.zeros(0)))
     assert [place.tolist() for _, _, place in found] == [[5.0]] * another_piece
 
 

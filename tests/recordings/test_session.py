@@ -87,8 +87,9 @@ def test_options_of_the_reader_are_handed_on(tmp_path: Path) -> None:
 
 def test_nothing_is_left_out_silently(tmp_path: Path) -> None:
     folder = bench(tmp_path, runs=3)
-    (folder / "more.cap").write_bytes(b"PK")
-    with pytest.warns(RecordingWarning, match=r"does not name more\.cap; not used"):
+    for name in ("more.cap", "more.h5", "more.parquet"):
+        (folder / name).write_bytes(b"PK")
+    with pytest.warns(RecordingWarning, match=r"does not name more\.cap, more\.h5, more\.parquet; not used"):
         session = load_session(folder)
     with pytest.warns(RecordingWarning, match=r"response\.csv: the notebook does not name Run #2, Run #3; not used"):
         session.recordings("response")

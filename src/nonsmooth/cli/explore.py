@@ -39,6 +39,7 @@ def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.study import load_model, named_model, read_study
     from nonsmooth.explorer.export import opened_result, opened_study
     from nonsmooth.explorer.serve import explore
+    from nonsmooth.recordings.load import ENDINGS
     from nonsmooth.results.store import load
 
     system, query = None, ""
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         system, query = opened_result(load(given))
     elif ":" in given:
         system = load_model(given, Path())
-    elif Path(given).suffix in (".csv", ".cap", ".lvm", ".tdms", ".mat"):
+    elif Path(given).suffix.lower() in ENDINGS:
         raise ValueError(f"{given}: is a recording; open a model, `nonsmooth explore MODEL`, and drop it into the page")
     else:
         named_model(given)

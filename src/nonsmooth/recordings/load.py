@@ -51,6 +51,9 @@ FORMATS = {
     "uff": "arrays",
     "mf4": "arrays",
 }
+#: Endings by which such a file is known before it is read; its content tells the format.
+ENDINGS = {".csv", ".tsv", ".txt", ".cap", ".lvm", ".tdms", ".xlsx", ".mat", ".h5", ".hdf5", ".npy", ".npz"}
+ENDINGS |= {".parquet", ".arrow", ".feather", ".wav", ".uff", ".unv", ".mf4"}
 #: Formats by the first bytes of a file, and of an archive by a member's name.
 _BEGINS = {
     b"PK\x03\x04": "zip",

@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
 from nonsmooth.errors import Answering, DataFileError, check_keys, unknown
-from nonsmooth.recordings.load import content_of, load_recording
+from nonsmooth.recordings.load import ENDINGS, content_of, load_recording
 from nonsmooth.recordings.reading import Options
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.system.kinds import reader_of, real_number
@@ -157,9 +157,6 @@ def table_of(value: Any, where: str, known: Iterable[str], kind: str = "a key") 
     return value
 
 
-_DATA_SUFFIXES = (".csv", ".tsv", ".txt", ".cap", ".lvm", ".tdms", ".mat")
-
-
 class RecordedRun(NamedTuple):
     """One run of a procedure: where its channels are, its name there, and what was set."""
 
@@ -293,7 +290,7 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
     files = [entry.file for entry in entries]
     if twice := sorted({file for file in files if files.count(file) > 1}):
         raise ValueError(f"{where}: {', '.join(twice)} is named twice; put all of its runs under one [[recording]]")
-    unnamed = sorted(p.name for p in place.iterdir() if p.suffix.lower() in _DATA_SUFFIXES and p.name not in files)
+    unnamed = sorted(p.name for p in place.iterdir() if p.suffix.lower() in ENDINGS and p.name not in files)
     if unnamed:
         warnings.warn(f"{where} does not name {', '.join(unnamed)}; not used", RecordingWarning, stacklevel=2)
     return Session(place, title, synthetic, apparatus, entries)

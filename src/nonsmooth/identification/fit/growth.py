@@ -228,7 +228,8 @@ def seen(whole: Grown, length: float, start: FloatArray | None, free: bool) -> G
     residuals = [residuals_of(now, short.state, c) for c in range(len(now.sensors))]
     if not np.isfinite(np.concatenate(residuals)).all():
         return closed
-    each, shared = _reduced(short), max(map(correlation_times, residuals))
+    of_long = (1.0 + whole.problem.colour) / (1.0 - whole.problem.colour)  # short windows take some of it away
+    each, shared = _reduced(short), max(*map(correlation_times, residuals), *of_long)
     gained = (_reduced(Stage(plain, whole.theta, whole.starts)) * many - each * few) / (many - few)
     better = f.sf(gained / max(each, _EXACT) / shared, many - few, few) < _CHANCE
     apart = np.sqrt(np.diag(inverted(reduced(now, short.state)[0] + now.unknowns.precision)[0]))
