@@ -70,6 +70,23 @@ def test_impacts_as_slow_as_they_are_followed() -> None:
     followed("two_stops", 1, 0.78, 0.82, w=0.8)
 
 
+@pytest.mark.parametrize(("w", "low", "high"), [(0.787, 0.785, 0.79), (0.788, 0.78, 0.82), (0.7881, 0.785, 0.79)])
+def test_an_impact_that_rounding_takes_or_not(w: float, low: float, high: float) -> None:
+    """At a stop at 0.9 the speed 1e-7 below which impacts are completed has two digits: a simulation takes one impact
+    more than the orbit beside it. The branch begins there, passes that speed once, and does not turn."""
+    branch = followed("two_stops", 1, low, high, w=w)
+    assert branch.sizes["special"] == 0
+    assert (np.diff(branch["w"].values) > 0.0).all()
+    assert branch.sizes["point"] < 40
+
+
+@pytest.mark.slow
+def test_behind_the_end_of_rest_the_edge_of_the_range() -> None:
+    """The wide range has a flip and a graze there too."""
+    special = ns.special_points(followed("rest", 3, 1.581, 1.5821421, a=1.5815))
+    assert special["kind"].values.tolist() == ["flip", "grazing"]
+
+
 def test_two_impacts_pass_the_section_in_one_step() -> None:
     """Behind the first one the search for the second one began at its zero, and ended there again and again."""
     followed("two_stops", 2, 0.58, 0.585, w=0.583)
@@ -101,7 +118,7 @@ def test_a_branch_jumps_only_where_no_orbit_comes_nearer(jump: float, monkeypatc
     """Of two orbits, one a jump away at every distance, one that arrives and is found from 1e-8 of the range on."""
 
     def orbit(name: str, apart: float, left: float) -> Any:
-        return SimpleNamespace(name=name, apart=apart, left=left, rise=1.0)
+        return SimpleNamespace(name=name, apart=apart, left=left, rise=1.0, signature=SimpleNamespace(cycle=name))
 
     def found(point: Any, common: Any, side: float, aside: float) -> list[Any]:
         if side < 0.0:
@@ -114,9 +131,11 @@ def test_a_branch_jumps_only_where_no_orbit_comes_nearer(jump: float, monkeypatc
         "_apart": lambda point, other: other.apart,
         "_left": lambda point, other: other.left,
         "_may_jump": lambda *sides: True,
-        "_leads_back": lambda point, other: False,
+        "_is_own": lambda point, other: False,
         "_came_by": lambda point, other, passed: False,
     }.items():
         monkeypatch.setattr(neighbours, name, stand_in)
-    taken: Any = neighbours.beside(SimpleNamespace(tangent=np.array([1.0])))  # type: ignore[arg-type]
+    end = orbit("before", 0.0, 0.0)
+    end.tangent, end.value, end.curve = np.array([1.0]), 0.0, SimpleNamespace(width=1.0)
+    taken: Any = neighbours.beside(end)  # type: ignore[arg-type]
     assert taken.name == ("own" if jump > 1e-8 else "other")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nonsmooth.continuation.march.event import Fold, Step, locate, special_on
+from nonsmooth.continuation.events.boundaries import Boundary
+from nonsmooth.continuation.march.event import Fold, Step, special_on
 from nonsmooth.continuation.problems.curve import Curve, Point
 
 
@@ -41,13 +42,24 @@ def step(a: float, b: float, cause: str = "") -> Step:
     return Step(*ends, numbers, (np.empty(0), np.empty(0)), cause=cause)
 
 
-@pytest.mark.parametrize(("first", "found"), [(-1e-9, True), (-5e-3, False), (-0.5, False)])
-def test_a_branch_begins_at_an_event_where_its_number_is_nothing_there(first: float, found: bool) -> None:
-    """5 parts in a thousand of the number behind are no rounding: the event lies elsewhere, or nowhere."""
-    one = step(0.2, 0.4)
-    there = locate(one, lambda point: first - (1.0 + first) * float(one.a.tangent @ (point.Y - one.a.Y)) / one.end)
-    assert (there is not None) is found
-    assert there is None or there[0] == 0.0
+class Left(Boundary):
+    """The circle is left at the angle 0.3."""
+
+    def number(self, point: Any) -> float:
+        return float(np.cos(0.3) * point.Y[1] - np.sin(0.3) * point.Y[0] - np.cos(0.6))
+
+    def surface(self, point: Any, beyond: Any = None) -> int:
+        return -1
+
+
+@pytest.mark.parametrize(("begun", "place"), [(0.2, 0.1), (0.3 + 1e-12, 0.0), (0.35, 0.0)])
+def test_a_march_that_begins_beyond_a_boundary_begins_at_it(begun: float, place: float) -> None:
+    """By what an orbit is solved for, however much more that is than rounding."""
+    one = step(begun, 0.4)
+    one.first = True
+    met = Left().met(one)
+    assert met is not None
+    assert met.s == pytest.approx(np.sin(place), abs=1e-11)
 
 
 @pytest.mark.parametrize(("beyond", "listed"), [(1e-2, 1), (1e-7, 0), (-1e-7, 0)])

@@ -48,6 +48,12 @@ class Boundary(Event):
         """The margin."""
         return float(point.curve.margins(point)[self.place])
 
+    def met(self, step: Step) -> Met | None:
+        """The boundary on a step; a march that begins beyond it, by what an orbit is solved for, begins at it."""
+        if step.first and self.number(step.a) < 0.0:
+            return Met(self, 0.0, step.a, self.name)
+        return super().met(step)
+
     def happened(self, step: Step, was: float, now: float) -> bool:
         """Return whether the boundary is passed on the step, or lies at the beginning of the march.
 

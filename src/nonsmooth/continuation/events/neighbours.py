@@ -21,7 +21,8 @@ from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Round
 from nonsmooth.continuation.searches.settled import touching
 
-ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
+ASIDE = 1e-9  # of the range: how far beyond the boundary orbits are looked for, and at ten times this and so on
+FARTHEST = 3e-4  # of the range, or of the parameter's value where that is larger: no farther
 NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
 SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
 LINEAR = 0.2  # by at least this factor, orbits of other signatures
@@ -33,6 +34,7 @@ ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
 ALONG = (1e-7, 1e-6, 1e-5)  # along the curve of a contact from the orbit where it has no speed
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
+NOISE = 1e-11  # of the orbit's size: a margin smaller than this is zero
 EXACT = 1e-9  # of the orbit's size: orbits that meet are as near as this
 STEPS = (1e-6, 1e-7, 1e-8)  # along a branch, each way: to the boundary beside which it was found, beyond rounding
 JUMP = 1e-6  # of the orbit's size: as far it jumps where an impact becomes slow enough to be completed as rest
@@ -41,37 +43,42 @@ AGAIN = 3  # times that Newton's method is begun with one signature
 MOST = 2000  # visits of a signature that is tried: Newton's method on more takes minutes
 
 
-def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[OrbitPoint] = ()) -> OrbitPoint | None:
+def beside(
+    point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[OrbitPoint] = (), onward: bool = False
+) -> OrbitPoint | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
-    ``contacts`` are those that may begin or end there, ``passed`` the points of the branch so far. Its tangent leads
-    away from there. None where there is none, or no simulated round shows it.
+    ``contacts`` are those that may begin or end there, ``passed`` the points of the branch so far; ``onward``: the
+    parameter does not turn there. Its tangent leads away from there. None where there is none, or no simulated round
+    shows it.
     """
     common = [end for change in contacts if (end := common_orbit(change)) is not None]
     forward = float(np.sign(point.tangent[-1])) or 1.0
-    nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
+    sides = (forward,) if onward else (forward, -forward)
+    nearest: dict[float, list[float]] = {side: [] for side in sides}  # of those found, at each distance
     ahead: tuple[float, OrbitPoint] | None = None  # one to which the branch jumps, and how far
-    for aside in ASIDE:
-        if ahead is not None and aside > ahead[0]:
-            break  # as far from the boundary no orbit could be nearer
+    aside, farthest = ASIDE, FARTHEST * max(1.0, abs(point.value) / point.curve.width)
+    while aside < farthest and (ahead is None or aside <= ahead[0]):  # farther off no orbit could be nearer
         for side, before in nearest.items():
             least = np.inf
             for found in _found(point, common, side, aside):
                 apart, left = _apart(point, found), _left(point, found)
                 arrives = left <= SHRINKS * apart + EXACT or _shrink([*before, apart])
                 jumps = side == forward and left <= JUMP and _may_jump(point, found)
-                if (arrives or jumps) and not (_leads_back(point, found) or _came_by(point, found, passed)):
+                if (arrives or jumps) and not (_is_own(point, found) or _came_by(point, found, passed)):
+                    again = found.signature.cycle == point.signature.cycle  # of others, the last
                     found = _leading_away(found, side, side != forward and left <= EXACT)
-                    if arrives and (ahead is None or left < NEARER * ahead[0]):
+                    if arrives and not again and (ahead is None or left < NEARER * ahead[0]):
                         return found
-                    ahead = ahead or (left, found)
+                    ahead = ahead or (aside if again else left, found)
                 least = min(least, apart)
             before.append(least)
+        aside *= 10.0
     if ahead is not None:
         return ahead[1]
     if not point.shooting.forced:  # behind a centre orbits of any size are closed
         return None
-    others = (one for one in _along(common) if not (_leads_back(point, one) or _came_by(point, one, passed)))
+    others = (one for one in _along(common) if not (_is_own(point, one) or _came_by(point, one, passed)))
     return next(others, None)
 
 
@@ -171,12 +178,16 @@ def _shrink(distances: list[float]) -> bool:
     return len(last) == CHAIN and all(a <= LINEAR * b for a, b in pairwise(last))
 
 
-def _leads_back(point: OrbitPoint, found: OrbitPoint) -> bool:
-    """Return whether an orbit lies on the branch that has come to ``point``, whatever its signature says."""
-    if (found.value - point.value) * point.rise > 0.0:
+def _is_own(point: OrbitPoint, found: OrbitPoint) -> bool:
+    """Return whether an orbit lies on the branch that has come to ``point``: back from there, or so near to the
+    boundary that only rounding says that it is not beyond."""
+    own, ahead = point.curve.at_parameter(point.Y, found.value), (found.value - point.value) * point.rise > 0.0
+    if own is None or not _is_same(point, own, found):
         return False
-    own = point.curve.at_parameter(point.Y, found.value)
-    return own is not None and not own.virtual and _is_same(point, own, found)
+    if own.signature.cycle != found.signature.cycle:
+        return not (ahead or own.virtual)
+    met = int(point.path.margins.argmin())  # the boundary
+    return not ahead or bool(found.path.margins[met] < NOISE * point.curve.size.max())
 
 
 def _came_by(point: OrbitPoint, found: OrbitPoint, passed: Sequence[OrbitPoint]) -> bool:

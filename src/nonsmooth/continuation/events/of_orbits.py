@@ -11,6 +11,7 @@ from nonsmooth.continuation.events.boundaries import (
     BOUNDARIES,
     Boundary,
     Crossed,
+    Own,
     Unseen,
     contacts_of,
     section_passed,
@@ -168,7 +169,9 @@ class AlongOrbits(Policy):
             mark(found, met, family)
             found.ending = "family"
             return None
-        beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
+        before = first.point, contacts_of(met), [row.point for row in found.rows]
+        slow = isinstance(first.kind, Own) and is_tolerance(first.point, first.kind.surface(first.point))
+        beyond = (beside(*before, onward=True) if slow else None) or beside(*before)  # at a tolerance nothing turns
         special, end = ([], None) if beyond is None else self._between(first.point, beyond)
         if beyond is None or not (_completes(met, beyond) or (end is not None and _completes([end], first.point))):
             centre = beyond is None and _is_centre(first)
@@ -187,6 +190,8 @@ class AlongOrbits(Policy):
         """The special points from the first orbit of a new signature back to ``point``, where the old one ends, and the
         end of the new one there."""
         found: list[Met] = []
+        if first.signature.cycle == point.signature.cycle:  # the same orbits on: back lie those that have been passed
+            return found, None
         away, steep = abs(first.value - point.value) / first.curve.width, abs(first.rise)
         b, ds = first.turned(), 2.0 * away / steep if steep * FARTHEST > away else 0.0
         numbers, left, grows = [kind.number(b) for kind in self.kinds], REACH * ds, 2.0

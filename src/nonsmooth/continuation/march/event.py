@@ -17,7 +17,6 @@ import numpy as np
 from nonsmooth.continuation.problems.curve import Point, branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
 
-BEGUN = 1e-6
 ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
 PLACE = 1e-11  # of a step: a bracket narrower than this is noise of solved points
 LARGEST = 1e3  # of a number, for Brent's method: margins may be infinite
@@ -182,8 +181,6 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
     from scipy.optimize import brentq
 
     at_ends = number(step.a), number(step.b)
-    if at_ends[0] * at_ends[1] > 0.0 and abs(at_ends[0]) < BEGUN * abs(at_ends[1]):
-        return 0.0, step.a  # the branch begins at the event itself
     known: dict[float, Point] = {0.0: step.a, step.end: step.b}
     nothing = ROUNDING * max((min(abs(x), LARGEST) for x in at_ends if np.isfinite(x)), default=1.0)
 
