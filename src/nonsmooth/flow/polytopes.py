@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
+from math import comb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 TOUCHING = 1e-8  # of the states' scales: polytopes nearer than this are one set
+CORNERS = 500  # of a linear programme, at most: beyond them a solver is asked
+FLAT = 1e-9  # a determinant of unit rows, a share of the cost: zero
 
 
 @dataclass(frozen=True)
@@ -70,19 +74,26 @@ class Polytope:
 
 def best(cost: FloatArray, slopes: FloatArray, room: FloatArray) -> FloatArray | None:
     """Minimise cost @ z where slopes @ z <= room; infinite where it has no bound, None where nothing fulfils that."""
-    if len(cost) == 1 and cost[0]:
-        way = -slopes[:, 0] * np.sign(cost[0])
-        ends = room / np.where(way, np.abs(way), np.nan)
-        least, most = -np.min(ends[way < 0], initial=np.inf), np.min(ends[way > 0], initial=np.inf)
-        return None if least > most + TOUCHING else np.array([-np.sign(cost[0]) * most])
+    n, d = slopes.shape
+    if cost.any() and n >= d and comb(n, d) <= CORNERS:
+        # every corner at once: the best is held by d conditions that all push against the cost
+        corners = np.array(list(combinations(range(n), d)))
+        corners = corners[np.abs(np.linalg.det(slopes[corners])) > FLAT]
+        if len(corners):
+            z = np.linalg.solve(slopes[corners], room[corners][..., None])[..., 0]
+            pushes = np.linalg.solve(slopes[corners].swapaxes(1, 2), -cost[:, None])[..., 0]
+            beyond = (z @ slopes.T - room).max(axis=1)
+            if beyond.min() > TOUCHING:
+                return None
+            beyond[pushes.min(axis=1) < -FLAT * np.abs(cost).max()] = np.inf
+            i = int(beyond.argmin())
+            return z[i] if beyond[i] <= TOUCHING else np.full(d, np.inf)
     from scipy.optimize import linprog
 
     exact = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
     found = linprog(cost, slopes, room, bounds=(None, None), method="highs-ds", options=exact)
     if found.status == 0:
         return np.asarray(found.x)
-    if found.status == 2:
-        return None
-    # the solver may not tell an unbounded problem from an empty one: is there any solution?
+    # the solver does not always tell an unbounded problem from an empty one: is there any solution?
     some = linprog(np.zeros(len(cost)), slopes, room, bounds=(None, None), method="highs-ds", options=exact)
     return np.full(len(cost), np.inf) if some.status == 0 else None
