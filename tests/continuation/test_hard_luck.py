@@ -255,3 +255,12 @@ def test_switching_where_nothing_branches() -> None:
         ns.continue_orbit(row)
     with pytest.raises(ValueError, match="one special point"):
         ns.continue_orbit(special)
+
+
+@pytest.mark.parametrize("high", [0.8109045226130653, 0.8181407035175879, 0.8231155778894473])
+def test_the_last_orbit_lies_at_the_edge_to_the_last_digit(high: float) -> None:
+    """An orbit found there is within the same range."""
+    system = ns.models.impact_oscillator(omega=0.8, c=0.2, d=2.0)
+    limits = 0.7999, high
+    branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "omega", limits, step=0.5)
+    assert branch["omega"].values[[0, -1]].tolist() == list(limits)

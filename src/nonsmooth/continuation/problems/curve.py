@@ -302,6 +302,7 @@ class Curve(ABC, Generic[P]):
         if found is None:
             return None
         solved, Y, iterations = found
+        solved.X[which] = value  # to the last digit: an orbit at the edge of a range is within it
         null = self.null_vectors(solved)
         return self.point(solved, Y, null[-1], iterations) if len(null) else None
 
