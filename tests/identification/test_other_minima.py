@@ -116,8 +116,8 @@ def fitted(rig: ns.System, records: Any) -> ns.ParameterSet:
 @pytest.mark.parametrize(
     ("until", "samples", "which"),
     [
-        (8, 201, slice(2)),
         (8, 161, slice(1, 2)),
+        pytest.param(8, 201, slice(2), marks=pytest.mark.slow),
         pytest.param(12, 301, slice(2), marks=pytest.mark.slow),
         pytest.param(12, 301, slice(1, 2), marks=pytest.mark.slow),
     ],
