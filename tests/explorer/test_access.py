@@ -107,11 +107,12 @@ def test_ctrl_c_is_heard_while_something_is_freed() -> None:
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        loop, pages = ioloop.IOLoop(), [Page()]
+        loop, pages, lost = ioloop.IOLoop(), [Page()], list[bool]()
         loop.add_callback(pages.clear)
-        loop.call_later(60, loop.stop)
+        loop.call_later(30, lambda: (lost.append(True), loop.stop()))
         with pytest.raises(KeyboardInterrupt):
             run(loop)
+        assert not lost
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
