@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.continuation.events.boundaries import Boundary
-from nonsmooth.continuation.march.event import Fold, Step, special_on
+from nonsmooth.continuation.march.event import Fold, Step, first_met, special_on
 from nonsmooth.continuation.problems.curve import Curve, Point
 
 
@@ -60,6 +60,27 @@ def test_a_march_that_begins_beyond_a_boundary_begins_at_it(begun: float, place:
     met = Left().met(one)
     assert met is not None
     assert met.s == pytest.approx(np.sin(place), abs=1e-11)
+
+
+class Window(Left):
+    """The circle is left between two angles."""
+
+    def __init__(self, low: float, high: float) -> None:
+        self.low, self.high = low, high
+
+    def number(self, point: Any) -> float:
+        angle = float(np.arctan2(*point.Y))
+        return (angle - self.low) * (angle - self.high)
+
+
+@pytest.mark.parametrize(("low", "high", "found"), [(0.22, 0.38, False), (0.22, 0.28, True), (0.32, 0.38, True)])
+def test_a_boundary_is_met_where_every_other_one_is_obeyed(low: float, high: float, found: bool) -> None:
+    """At 0.3, unless that lies in a window that both ends of the step obey: a shorter step meets that."""
+    boundaries, one = (Left(), Window(low, high)), step(0.2, 0.4)
+    one.margins = tuple(np.array([kind.number(end) for kind in boundaries]) for end in (one.a, one.b))
+    met = first_met(one, boundaries)
+    assert (met is not None) is found
+    assert met is None or [type(each.kind) for each in met] == [Left]
 
 
 @pytest.mark.parametrize(("beyond", "listed"), [(1e-2, 1), (1e-7, 0), (-1e-7, 0)])

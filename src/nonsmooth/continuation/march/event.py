@@ -222,7 +222,8 @@ def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
     """The first boundary on a step: all that is met there, what explains it best first.
 
     Beyond the place where an impact or a short visit ends the path also goes through the boundary, and the other way
-    round: what vanishes explains what is touched. None where a boundary was passed but not located.
+    round: what vanishes explains what is touched. None where a boundary was passed but not located, or the place lies
+    beyond another one that both ends of the step obey.
     """
     located: list[Met] = []
     passed = False
@@ -244,8 +245,11 @@ def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
             located.append(met)
     if not located:
         return None if passed and not step.cause else []
-    first = min(met.s for met in located)
-    return [met for met in located if met.s <= first + BESIDE]
+    first = min(located, key=lambda met: met.s)
+    for kind, was, now in zip(boundaries, *step.margins, strict=True):
+        if not step.virtual and min(was, now) > 0.0 and kind.number(first.point) < -SURE * min(was, now):
+            return None
+    return [met for met in located if met.s <= first.s + BESIDE]
 
 
 def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
