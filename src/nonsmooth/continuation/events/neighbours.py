@@ -185,7 +185,7 @@ def _is_own(point: OrbitPoint, found: OrbitPoint) -> bool:
     if own is None or not _is_same(point, own, found):
         return False
     if own.signature.cycle != found.signature.cycle:
-        return not (ahead or own.virtual)
+        return not ahead
     met = int(point.path.margins.argmin())  # the boundary
     return not ahead or bool(found.path.margins[met] < NOISE * point.curve.size.max())
 
