@@ -181,11 +181,12 @@ def _shrink(distances: list[float]) -> bool:
 def _is_own(point: OrbitPoint, found: OrbitPoint) -> bool:
     """Return whether an orbit lies on the branch that has come to ``point``: back from there, or so near to the
     boundary that only rounding says that it is not beyond."""
-    own, ahead = point.curve.at_parameter(point.Y, found.value), (found.value - point.value) * point.rise > 0.0
+    ahead = (found.value - point.value) * point.rise > 0.0
+    if ahead and found.signature.cycle != point.signature.cycle:
+        return False
+    own = point.curve.at_parameter(point.Y, found.value)
     if own is None or not _is_same(point, own, found):
         return False
-    if own.signature.cycle != found.signature.cycle:
-        return not ahead
     met = int(point.path.margins.argmin())  # the boundary
     return not ahead or bool(found.path.margins[met] < NOISE * point.curve.size.max())
 
