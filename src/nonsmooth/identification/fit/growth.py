@@ -15,7 +15,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import Residuals, inverted, reduced, settle
+from nonsmooth.identification.arrow import Residuals, concerned, inverted, reduced, settle
 from nonsmooth.identification.fit.first_level import (
     BETTER,
     Stage,
@@ -64,7 +64,7 @@ class Grown(Stage):
     opened : bool, optional
         Whether short windows with starts of their own fit better than noise allows; None where nobody has looked.
     apart : array (p,)
-        Standard uncertainties of the unknowns over these windows, zero where nobody has looked.
+        Standard uncertainties of the unknowns over these windows, empty where nobody has looked.
     begins : tuple of (int, int, float)
         Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
     doubted : tuple of int
@@ -232,7 +232,8 @@ def seen(whole: Grown, length: float, start: FloatArray | None, free: bool) -> G
     each, shared = _reduced(short), max(*map(correlation_times, residuals), *of_long)
     gained = (_reduced(Stage(plain, whole.theta, whole.starts)) * many - each * few) / (many - few)
     better = f.sf(gained / max(each, _EXACT) / shared, many - few, few) < _CHANCE
-    apart = np.sqrt(np.diag(inverted(reduced(now, short.state)[0] + now.unknowns.precision)[0]))
+    covariance, loose = inverted(reduced(now, short.state)[0] + now.unknowns.precision)
+    apart = np.where(concerned(loose).any(axis=1), np.inf, np.sqrt(np.diag(covariance)))
     return replace(whole, opened=bool(better), apart=apart)
 
 

@@ -9,9 +9,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import scipy.linalg  # noqa: F401  it loads a library of its own, which is to have one thread too
+from threadpoolctl import threadpool_limits
 
 from nonsmooth import ParameterSet, SolveError
-from nonsmooth.blas import one_blas_thread
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import RecordingWarning, Session
 from nonsmooth_savi2007.identification.adjustment import Adjusted, Observation, adjust
@@ -50,7 +51,7 @@ _FOUND_BY = {
 }
 
 
-@one_blas_thread()
+@threadpool_limits.wrap(limits=1, user_api="blas")  # the matrices are small: threads would wait for each other
 def identify(
     recordings: Session | str | os.PathLike[str] | Mapping[str, Any],
     model: Any = None,
