@@ -42,6 +42,10 @@ def test_all_of_a_picture_is_in_view(name: str) -> None:
             begin, end = filled(one, axis)
             if begin <= end:
                 assert -1e-9 <= begin and end <= 1 + 1e-9 and end - begin > 0.05
+    ax.figure.draw_without_rendering()
+    for one in filter(None, (one.get_legend() for one in ax.figure.axes)):
+        box, whole = one.get_window_extent(), ax.figure.bbox
+        assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and whole.y0 <= box.y0 and box.y1 <= whole.y1
     plt.close(ax.figure)
 
 

@@ -307,13 +307,19 @@ def even_dots(legend: Legend) -> None:
 
 
 def legend(ax: Axes, loc: str = "", columns: int = 2) -> Legend:
-    """Place the legend in the axes, or above them, in as many columns as the figure has room for."""
+    """Place the legend in the axes, or above them, in as many columns as the figure has room for.
+
+    Above them it ends at their right edge; a wider one goes on over what stands beside them."""
     whole: Any = ax.figure.canvas.figure  # of a figure within a figure too
-    place = {"loc": loc} if loc else _ABOVE
+    whole.draw_without_rendering()
+    box = ax.get_window_extent()
     for number in range(columns, 0, -1):  # names of modes may be long
-        made = ax.legend(**place, ncols=number, columnspacing=1.0)
-        if made.get_window_extent().width <= 0.9 * whole.bbox.width:
+        made = ax.legend(**({"loc": loc} if loc else _ABOVE), ncols=number, columnspacing=1.0)
+        width = made.get_window_extent().width
+        if width <= 0.9 * whole.bbox.width:
             break
+    if not loc:
+        made.set_bbox_to_anchor((1.0 + max(width - 0.98 * box.x1, 0.0) / box.width, 1.0), ax.transAxes)
     even_dots(made)
     return made
 

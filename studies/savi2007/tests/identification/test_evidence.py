@@ -73,3 +73,30 @@ def test_identify_refuses_what_has_no_mass_or_no_uncertainty():
         ns.identify({"impulse": recording()}, apparatus=KNOWN, crank_length=-1)
     with pytest.raises(ValueError, match="channel 'Angle' does not change in 1 of 1 runs"):
         ns.identify({"impulse": recording()}, apparatus=KNOWN)
+
+
+def pulls(slope, name="Run #1"):
+    """A pull of springs in closed form, as a file of its own."""
+    x = 0.1 * np.sin(np.pi * np.arange(200) / 199) ** 2
+    sensors = {
+        channel: xr.Dataset(
+            {channel: ("time", values, {"units": unit, "long_name": channel})}, {"time": np.arange(200) / 100}
+        )
+        for channel, values, unit in (("Angle", 2 * np.pi * x / 0.0789, "rad"), ("Force", slope * x, "N"))
+    }
+    return Recording.from_runs({name: sensors}, synthetic=True, source={}, run_attrs={name: {}})
+
+
+def test_runs_of_one_name_in_two_recordings_are_told_apart():
+    found = gather({"springs": [pulls(17.0), pulls(-19.0), pulls(18.0, "Run #2")]}, apparatus=KNOWN)
+    one, other, third = found.runs["springs"]
+    assert (one.name, other.name, third.name) == ("Run #1 of recording 1", "Run #1 of recording 2", "Run #2")
+    for run, slope in (one, 17.0), (other, 19.0), (third, 18.0):  # the second was pushed, and no other
+        assert np.polyfit(run.positions, run.force.values, 1)[0] == pytest.approx(slope, rel=1e-2)
+    assert "1 of 3 runs (Run #1 of recording 2)" in found.notes[0]
+
+
+def test_a_run_that_is_given_twice_is_refused():
+    once = pulls(17.0)
+    with pytest.raises(ValueError, match="springs Run #1 is given twice"):
+        gather({"springs": [once, pulls(18.0), once]}, apparatus=KNOWN)

@@ -6,8 +6,9 @@ Beside it the data of the findings' pictures: each variable in the unit that it 
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -183,7 +184,7 @@ def gather(
     for procedure, rows in taken.items():
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "the experiment", PROCEDURES.keys()))
-        runs[procedure] = tuple(_run(procedure, travel, counts, *row) for row in rows)
+        runs[procedure] = _told_apart([_run(procedure, travel, counts, *row) for row in rows], [row[0] for row in rows])
     runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
     runs |= {procedure: () for procedure in PROCEDURES if procedure not in runs}
@@ -201,6 +202,20 @@ def _rows(procedure: str, given: Any) -> list[Any]:
     if not rows:
         raise ValueError(f"there are no recordings of {procedure!r}; leave the procedure out")
     return rows
+
+
+def _told_apart(runs: Sequence[Run], recordings: Sequence[Recording]) -> tuple[Run, ...]:
+    """The runs; those of one name, as files of separate exports have them, with the number of their recording.
+
+    ValueError: a run is given twice."""
+    number = {one: 1 + k for k, one in enumerate(dict.fromkeys(map(id, recordings)))}
+    often, found = Counter(run.name for run in runs), {}
+    for run, recording in zip(runs, recordings, strict=True):
+        key = number[id(recording)], run.name
+        if key in found:
+            raise ValueError(f"{run.label} is given twice; it would count as two runs")
+        found[key] = replace(run, name=f"{run.name} of recording {key[0]}") if often[run.name] > 1 else run
+    return tuple(found.values())
 
 
 def _run(
