@@ -142,3 +142,16 @@ def test_two_records_share_the_slope_and_have_starts_of_their_own() -> None:
     assert found["a"] == pytest.approx(a, rel=1e-6)
     starts = [one.value for name, one in found.extra.items() if name.startswith("x(0)")]
     assert starts == pytest.approx([b0, b1], rel=1e-6)
+
+
+def test_readings_without_noise_have_the_uncertainty_of_rounding_and_no_notes_on_noise() -> None:
+    """Regression with the standard deviation of a count, d / sqrt(12), where one is given; else of the arithmetic."""
+    t = np.linspace(0.0, 3.0, 60)
+    data = xr.Dataset({"x": ("time", 1.0 + 2.0 * t)}, {"time": t})
+    _, C, _ = regression(data)
+    for sensor, least in (ns.Sensor(resolution=0.01), 0.01 / np.sqrt(12.0)), (ns.Sensor(), 1e-13 * 7.0):
+        found = ns.fit(line(), data, ["a"], measured={"x": sensor}, progress=False)
+        assert found.extra["x.noise"].value == pytest.approx(least, rel=1e-9)
+        assert found.estimate("a").uncertainty == pytest.approx(least * np.sqrt(C[0, 0]), rel=0.02)
+        assert abs(found["a"] - 2.0) < found.uncertainty["a"]
+        assert not [note for note in found.notes if "outliers" in note or "correlates by" in note]

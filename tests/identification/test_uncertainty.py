@@ -90,6 +90,7 @@ def test_parameters_known_mainly_together_keep_the_uncertainty_of_white_residual
         state = Residuals([r], [table], [np.zeros((n, 1))])
         problem = SimpleNamespace(
             pieces=[piece],
+            rounded=0.0,
             residuals=lambda theta, starts, slopes, now=state: now,
             weights=lambda state: [np.ones(n)],
             unknowns=SimpleNamespace(precision=np.zeros((2, 2))),

@@ -216,7 +216,8 @@ class Sandwich(NamedTuple):
 
 
 def sandwich(problem: Windows, theta: FloatArray, starts: FloatArray) -> Sandwich:
-    """Covariance of the parameters at the best fit, never smaller along any than that of white residuals."""
+    """Covariance of the parameters at the best fit, never smaller along any than that of white residuals, nor than that
+    of rounding."""
     p, prior = len(theta), problem.unknowns.precision
     state = problem.residuals(theta, starts, True)
     weights = problem.weights(state)
@@ -232,7 +233,7 @@ def sandwich(problem: Windows, theta: FloatArray, starts: FloatArray) -> Sandwic
         meat[np.ix_(piece.which, piece.which)] += newey_west(scores, tau[-1])
         rows += len(r)
     freedom = max(rows - sum(piece.n_free for piece in problem.pieces) - p, 1)
-    size = state.chi2(weights) / freedom
+    size = max(state.chi2(weights) / freedom, problem.rounded)
     inverse, _ = inverted(normal + prior)
     part = rows / freedom
     covariance = not_below(

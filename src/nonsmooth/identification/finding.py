@@ -92,13 +92,13 @@ def newey_west(scores: FloatArray, times: float) -> FloatArray:
 
 
 def not_below(covariance: FloatArray, least: FloatArray) -> FloatArray:
-    """The covariance with no variance below that of ``least``, its correlations as they are.
+    """The covariance with no variance below that of ``least``, its correlations as they are, where it has any.
 
-    A short record can make a sum of few products small by chance.
+    A short record can make a sum of few products small by chance, and residuals that are zero have no scatter.
     """
-    ratio = np.sqrt(np.maximum(np.diag(least), 1e-300) / np.maximum(np.diag(covariance), 1e-300))
-    raised = np.maximum(ratio, 1.0)
-    return covariance * np.outer(raised, raised)
+    shape = covariance if np.diag(covariance).all() else least
+    raised = np.sqrt(np.maximum(np.diag(least), np.diag(covariance)) / np.maximum(np.diag(shape), 1e-300))
+    return shape * np.outer(raised, raised)
 
 
 def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = None) -> FloatArray:

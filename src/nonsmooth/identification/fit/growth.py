@@ -26,7 +26,6 @@ from nonsmooth.identification.fit.first_level import (
 )
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, residuals_of, robust_size, strange
-from nonsmooth.identification.fit.steady import ROUNDING
 from nonsmooth.identification.fit.window import Window
 from nonsmooth.identification.fit.windows import Windows
 from nonsmooth.recordings.signals.spectrum import correlation_times
@@ -356,7 +355,5 @@ def _noise(problem: Windows, state: Residuals) -> FloatArray:
             found[c] = np.hypot(sensor.noise, sensor.floor)
         else:
             size = robust_size(r) if np.isfinite(problem.loss) else np.sqrt(np.mean(r**2)) if len(r) else 0.0
-            values = [record.values[:, c] for record in problem.records]
-            largest = max((np.nanmax(np.abs(y), initial=0.0) for y in values), default=0.0)
-            found[c] = max(size * np.sqrt(grow), 0.5 * sensor.floor, ROUNDING * largest, 1e-300)
+            found[c] = max(size * np.sqrt(grow), problem.least[c])
     return found

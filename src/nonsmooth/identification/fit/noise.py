@@ -39,10 +39,10 @@ def _colour(problem: Windows, c: int, rows: list[tuple[FloatArray, FloatArray]])
     every = _joined(rows)
     cut = 5.0 * robust_size(every)
     cuts = [(problem.gaps(c, t), np.clip(r, -cut, cut)) for t, r in rows if len(r) > 1]
-    if not cuts or not every.any():
+    power = np.mean(np.clip(every, -cut, cut) ** 2) if cuts else 0.0
+    if not power > problem.least[c] ** 2:  # what is left is no noise
         return 0.0
     gaps, before, here = (np.concatenate(one) for one in zip(*((gap, r[:-1], r[1:]) for gap, r in cuts), strict=True))
-    power = max(float(np.mean(np.clip(every, -cut, cut) ** 2)), 1e-300)
 
     def unlikely(rho: float) -> float:
         """Minus twice the logarithm of the likelihood."""

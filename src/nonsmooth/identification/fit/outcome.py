@@ -307,7 +307,7 @@ def _of_readings(grown: Grown, c: int, data: xr.Dataset) -> list[str]:
             f"the noise of {name} correlates by {problem.colour[c]:.2f} from reading to reading ({problem.step[c]:.3g} "
             "apart, the shortest where runs differ), and is weighed by that"
         )
-    out = np.flatnonzero(np.abs(r) > OUTLYING * max(robust_size(r), problem.sensors[name].floor))
+    out = np.flatnonzero(np.abs(r) > OUTLYING * max(robust_size(r), problem.least[c]))
     if 0 < len(out) < _FEW * len(r):
         at = ", ".join(f"{t:.6g}" for t in time[out[:_NAMED]]) + (", ..." if len(out) > _NAMED else "")
         weighed = "has weighed them down" if np.isfinite(problem.loss) else "weighs such readings down"

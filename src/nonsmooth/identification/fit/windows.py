@@ -23,7 +23,7 @@ from nonsmooth.identification.fit.jumps import Sides, sided
 from nonsmooth.identification.fit.motion import Marcher
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Observable, Sensor, Unknowns
-from nonsmooth.identification.fit.steady import SteadyReadings, predicted
+from nonsmooth.identification.fit.steady import ROUNDING, SteadyReadings, predicted
 from nonsmooth.identification.fit.window import Window
 from nonsmooth.system.system import System
 
@@ -90,6 +90,19 @@ class Windows:
     def gaps(self, c: int, time: FloatArray) -> FloatArray:
         """Times between readings of a quantity, in its steps."""
         return np.maximum(np.diff(time) / self.step[c], 0.2)
+
+    @cached_property
+    def least(self) -> FloatArray:
+        """Least noise of a reading of each quantity: its sensor's rounding, or that of the arithmetic."""
+        largest = [np.nanmax(np.abs(record.values), axis=0, initial=0.0) for record in self.records]
+        floors = [sensor.floor for sensor in self.sensors.values()]
+        return np.maximum(np.maximum(floors, ROUNDING * np.max(largest, axis=0, initial=0.0)), 1e-300)
+
+    @property
+    def rounded(self) -> float:
+        """Part of the variances of all readings' noise that is the least."""
+        of = [window.readings[1] for window in self.pieces]
+        return float(np.mean(((self.least / self.noise) ** 2)[np.concatenate(of)])) if of else 0.0
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:
