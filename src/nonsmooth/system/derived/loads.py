@@ -17,6 +17,7 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived import elements
 from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.elements.element import words_of
 from nonsmooth.system.derived.elements.stop import RUBS
 from nonsmooth.system.derived.expressions import SPEED, Expressions
 from nonsmooth.system.symbolic.expressions import write_expression
@@ -68,8 +69,7 @@ class Loads:
 
     def held(self, mode: str) -> list[Load]:
         """The elements that hold their rates at zero in a mode, by its name."""
-        words = [f"{re.escape(one.name)}_({'|'.join(one.element.phases)})" for one in self.elements]
-        found = re.fullmatch("(?:.*_)?" + "_".join(words), mode)
+        found = re.fullmatch("(?:.*_)?" + words_of({one.name: one.element for one in self.elements}), mode)
         phases = found.groups() if found else ()
         return [one for one, phase in zip(self.elements, phases, strict=False) if phase in one.element.held]
 

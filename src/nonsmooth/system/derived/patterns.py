@@ -7,6 +7,7 @@ phases visited so far are numbered in the order of their first visit; all copies
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +21,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.codegen.linear import SHAPES
 from nonsmooth.system.derived.assembly import Pattern
-from nonsmooth.system.derived.elements.element import THROWN
+from nonsmooth.system.derived.elements.element import THROWN, words_of
 from nonsmooth.system.derived.leads import Conditions, Lead, Out, Reset
 from nonsmooth.system.derived.rows import Row, Rows
 from nonsmooth.system.symbolic.domain import forcing_period
@@ -316,18 +317,12 @@ class Patterns:
 
     def named(self, name: str) -> int | None:
         """The number of the pattern of a name; None where there is none."""
-        ends: dict[str, Pattern] = {name: ()}  # what is left of the name, and the phases read
-        for key, element in self.elements.items():
-            words = [f"{key}_{phase}" for phase in element.phases]
-            ends = {
-                rest[len(word) :].removeprefix("_"): (*phases, k)
-                for rest, phases in ends.items()
-                for k, word in enumerate(words)
-                if rest == word or rest.startswith(f"{word}_")
-            }
-        pattern = ends.get("")
-        held = pattern is not None and self.make.may_hold(self.make.held(pattern), self.mode)
-        return self.number(pattern) if pattern is not None and held else None
+        found = re.fullmatch(words_of(self.elements), name)
+        if found is None:
+            return None
+        phases = zip(self.elements.values(), found.groups(), strict=True)
+        pattern = tuple(element.phases.index(phase) for element, phase in phases)
+        return self.number(pattern) if self.make.may_hold(self.make.held(pattern), self.mode) else None
 
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""

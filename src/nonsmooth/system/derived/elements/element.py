@@ -8,6 +8,7 @@ stands around it is a :class:`Place`.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
@@ -148,6 +149,11 @@ class Element(ABC):
     @abstractmethod
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         """The place of the element, by a coordinate ``q`` and its speed ``v`` (:func:`nonsmooth.mechanical`)."""
+
+
+def words_of(elements: Mapping[str, Element | type[Element]]) -> str:
+    """The regular expression of a combination's name, with a group for the phase of each element."""
+    return "_".join(f"{re.escape(name)}_({'|'.join(one.phases)})" for name, one in elements.items())
 
 
 @dataclass(frozen=True, kw_only=True)
