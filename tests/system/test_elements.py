@@ -498,3 +498,40 @@ def test_what_sticks_or_rests_keeps_no_speed(impacts: str) -> None:
         ]
         assert sum(held) > 4
         assert not run.u_after.values[held, 1].any()
+
+
+def test_a_belt_that_is_written_to_memory_at_an_instant_turns_no_mass() -> None:
+    """Friction 0.2 and a drag of 0.01 on a mass of 1: v' = -0.01 v - 0.2, then + 0.2; no force is an impulse."""
+    system = ns.System(
+        states=["v"],
+        parameters={"mu": 0.2},
+        memory={"belt": (-1.0, "")},
+        modes={"all": lambda t, u, p: (-0.01 * u.v,)},
+        period=4.0,
+        transitions=[ns.Transition("all", "all", at=0.5, write={"belt": lambda t, u, p: 1.5 + 0.0 * t})],
+        elements={"rub": Coulomb(speed=lambda t, u, p: u.v - p.belt, friction="mu", on={"v": 1.0})},
+    )
+
+    def later(v: float, force: float, time: float) -> float:
+        return force / 0.01 + (v - force / 0.01) * np.exp(-0.01 * time)
+
+    for begins, turned in ((0.0, later(0.0, -0.2, 2.0)), (-1.0, -1.0)):  # it slips, and it sticks to the belt before
+        run = ns.simulate(system, duration=3.0, start={"v": begins})
+        assert run.u_after.values[:, 0] == pytest.approx([turned, turned], abs=1e-12)
+        assert run.u.values[-1, 0] == pytest.approx(later(turned, 0.2, 1.0), abs=1e-12)
+
+
+def test_a_support_lets_go_of_what_a_reset_has_moved_away() -> None:
+    """Its damper would push a mass that comes back fast, and the gap is open."""
+    system = ns.System(
+        states=["x", "v"],
+        parameters={"k": 100.0, "c": 5.0},
+        modes={"all": lambda t, u, p: (u.v, 0.0)},
+        period=1.0,
+        transitions=[ns.Transition("all", "all", at=0.6, reset=lambda t, u, p: (-0.01, 1.0))],
+        elements={"wall": ElasticStop(gap=lambda t, u, p: -u.x, on={"v": -1.0}, stiffness="k", damping="c")},
+    )
+    run = ns.simulate(system, duration=0.605, start={"x": -0.5, "v": 1.0})
+    assert run.wall_force.values.max() > 4.0  # it was in contact before
+    assert run.u.values[-1] == pytest.approx([-0.005, 1.0], abs=1e-12)
+    assert run.wall_force.values[-1] == 0.0

@@ -455,3 +455,27 @@ def test_a_preloaded_spring_rests_in_its_band():
     )
     run = ns.simulate(spring.smoothed(1e-3), duration=400.0, start={"q": 0.5}, samples=2)
     assert run.u.values[-1] == pytest.approx([0.3 / 1001, 0.0], abs=1e-9)
+
+
+def test_a_switch_beside_elements_that_decide_together_has_its_band():
+    """A mass against a spring of the system's own, with a second that it drags along, by the sharp system's motion."""
+    rub = ns.elements.Coulomb
+    system = System(
+        states=["x", "v", "w"],
+        parameters={"k": 50.0},
+        modes={
+            "off": lambda t, u, p: (u.v, np.cos(t) - u.x, -u.w),
+            "on": lambda t, u, p: (u.v, np.cos(t) - u.x - p.k * (u.x - 0.5), -u.w),
+        },
+        indicators={"h": lambda t, u, p: u.x - 0.5},
+        transitions=[Transition("off", "on", when="h > 0"), Transition("on", "off", when="h < 0")],
+        elements={
+            "a": rub(speed=lambda t, u, p: u.v, friction=0.1, on={"v": 1.0}),
+            "b": rub(speed=lambda t, u, p: u.v - u.w, friction=0.05, on={"v": 1.0, "w": -1.0}),
+        },
+    )
+    sharp, smoothed = (
+        ns.simulate(one, duration=6.0, start={"x": 0.4, "v": 1.0}) for one in (system, system.smoothed(1e-4))
+    )
+    assert sharp.u.values[:, 0].max() < 0.7  # without the spring 1.6
+    assert smoothed.u.values[-1] == pytest.approx(sharp.u.values[-1], abs=1e-5)

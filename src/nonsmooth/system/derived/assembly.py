@@ -46,6 +46,7 @@ class Assembler(Calculus):
     """The fields, forces and impulses of combinations of phases, over a calculus."""
 
     sequential: bool = False  # impacts of one instant come one after the other
+    resets: bool = False  # a transition of the system's own may change the place or the rate of an element at once
     asks: bool = False  # what several elements decide together is asked at each instant (``deciding``)
     draws: tuple[int, ...] = ()  # of states and parameters, at which numbers that must be constant are compared
 

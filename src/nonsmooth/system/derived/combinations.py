@@ -86,14 +86,16 @@ def assembled(
         key: call_vector(mode.field, symbols.arguments(), tuple(symbols.u), f"the vector field of mode {key!r}")
         for key, mode in modes.items()
     }
-    resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
     make = Expressions(symbols, base, parts, given["scale"], values)
     number = len(base) * math.prod(len(part.element.phases) for part in make.parts)
     make.sequential = given["impacts"] == "sequential" and len(make.striking) > 1
     if number > MOST or make.rubbing or make.sequential:
         why = f"have more than {MOST} combinations of phases"
         return _opened(make, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
-    make.asks = _decide_together(make, resets)
+    own = [item for item in given["transitions"] if isinstance(item, Transition)]
+    written = {symbols.m[name] for item in own for name in item.write or () if name in symbols.m}
+    make.resets = any(item.reset is not None for item in own) or not written.isdisjoint(make.feels())
+    make.asks = _decide_together(make)
     visited = make.asks and not given["written"] and named is None and not any(given[key] for key in ALONE_WITH)
     if visited and (patterns := _affine(make, given)) is not None:
         return {**_opened(make, given, "decide together", patterns), "also written": True}
@@ -162,7 +164,7 @@ def _written_out(
                 ends = name(item.source, pattern), name(item.target, pattern)
                 contact = item.begins_contact(next(iter(base)))
                 transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write, contact))
-                kinds.append(OWN if item.reset is None else ASKS_BEHIND)
+                kinds.append(OWN if item.reset is None and not item.write else ASKS_BEHIND)
     decider = Decider(make, pairs, _affine(make, given)) if make.asks else None
     outputs = {}
     for key, (function, unit) in given["outputs"].items():
@@ -180,9 +182,9 @@ def _written_out(
     }
 
 
-def _decide_together(make: Expressions, resets: bool) -> bool:
-    """Return whether the force of one element that may be held changes the rate of another at once, or a reset of the
-    system's own may."""
+def _decide_together(make: Expressions) -> bool:
+    """Return whether the force of one element that may be held changes the rate of another at once, or a transition of
+    the system's own may."""
     bearing = [k for k, part in enumerate(make.parts) if part.element.held]
     for k in bearing:
         if any(make.vanishes(make.across(make.rate(k, mode), make.parts[k])) for mode in make.fields):
@@ -191,7 +193,7 @@ def _decide_together(make: Expressions, resets: bool) -> bool:
                 "the state whose derivative it adds to, as the speed"
             )
     pairs = combinations(bearing, 2)
-    return (bool(bearing) and resets) or any(make.coupled(i, j, mode) for i, j in pairs for mode in make.fields)
+    return (bool(bearing) and make.resets) or any(make.coupled(i, j, mode) for i, j in pairs for mode in make.fields)
 
 
 def _affine(make: Expressions, given: Mapping[str, Any]) -> Patterns | None:

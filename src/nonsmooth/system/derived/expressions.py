@@ -177,6 +177,12 @@ class Expressions(Assembler):
             at[symbol] = rng.uniform(0.5, 1.5)
         return {symbol: sp.Float(value) for symbol, value in at.items()}
 
+    def feels(self) -> set[sp.Basic]:
+        """The symbols of which the places of elements and the rates that they hold are made."""
+        bearing = [k for k, part in enumerate(self.parts) if part.element.held]
+        rates = [self.rate(k, mode) for k in bearing for mode in self.fields]
+        return set[sp.Basic]().union(*(e.free_symbols for e in (*rates, *(part.where for part in self.parts))))
+
     @kept
     def may_hold(self, some: tuple[int, ...], mode: str) -> bool:
         """Return whether some elements can be held at once."""

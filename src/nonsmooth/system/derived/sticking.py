@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.symbolic.traced import ALONE, Traced, TracedCondition, TracedTransition, along
+from nonsmooth.system.symbolic.traced import ASKED, Traced, TracedCondition, TracedTransition, along
 
 LEVEL = 1e-9  # of 1: by how much a static friction may differ from the kinetic one, given as another number
 
@@ -20,7 +20,7 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
     A mode sticks to h = 0 between P and Q where a transition from P when h rises and one from Q when h falls lead to
     it. There P and Q change into each other then, whatever else is asked for today."""
     if traced.decider is not None:  # what is asked of elements that hold each other
-        jumps_left = tuple(jump for jump in traced.transitions if jump.kind in ("", ALONE))
+        jumps_left = tuple(jump for jump in traced.transitions if jump.fires and jump.kind != ASKED)
         traced = replace(traced, transitions=jumps_left, decider=None)
     rising: dict[tuple[int, int], dict[int, int]] = {}  # (mode, indicator) -> sign of the row -> source
     for jump in traced.transitions:

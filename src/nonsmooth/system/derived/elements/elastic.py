@@ -63,7 +63,7 @@ class ElasticStop(Contact):
         push = self.force(here.put("contact"))
         if here.phase == "open":
             return [Leaving("contact", [inside, Condition(push, 1, "push")])]
-        jumps = [Leaving("open", [outside])] if here.make.driven(here.where) else []  # else it pulls before
+        jumps = [Leaving("open", [outside])] if here.may_jump() else []  # else it pulls before
         return [*jumps, Leaving("open", [Condition(push, -1, "push")])]
 
 

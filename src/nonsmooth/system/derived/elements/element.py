@@ -281,6 +281,10 @@ class Place:
         """Return whether nothing is asked where a run begins, so that its conditions must lead out of its phase."""
         return not self.make.asks
 
+    def may_jump(self) -> bool:
+        """Return whether its place may change at once: by an input, or by a transition of the system's own."""
+        return self.make.resets or self.make.driven(self.where)
+
     def may_be_beyond(self) -> bool:
         """Return whether its place may be any where it enters a phase: a run begins there, or an input jumps."""
         return self.begins_alone() or self.make.driven(self.where)
