@@ -535,3 +535,25 @@ def test_a_support_lets_go_of_what_a_reset_has_moved_away() -> None:
     assert run.wall_force.values.max() > 4.0  # it was in contact before
     assert run.u.values[-1] == pytest.approx([-0.005, 1.0], abs=1e-12)
     assert run.wall_force.values[-1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"outputs": {"floor_force": lambda t, u, p: u.x}}, "an output and to a load of an element"),
+        ({"outputs": {"floor_impulse": lambda t, u, p: u.x}}, "an output and to a load of an element"),
+        ({"indicators": {"floor_gap": lambda t, u, p: u.x - 1.0}}, "an indicator and to a condition of an element"),
+    ],
+)
+def test_what_is_called_as_something_of_an_element_is_refused(given: dict[str, Any], said: str) -> None:
+    """One of the two would stand for both: a switch at a height of 1 would be one at the floor."""
+    ball: dict[str, Any] = {"states": ["x", "v"], "parameters": {"e": 0.5}, "modes": {"fly": lambda t, u, p: (u.v, -1)}}
+    floor = Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}, restitution="e")
+    with pytest.raises(ns.SystemDefinitionError, match=said):
+        ns.System(**ball, **given, elements={"floor": floor})
+
+
+def test_the_friction_at_a_stop_is_no_other_element() -> None:
+    elements = {"a": Stop(at="x", position=1.0, friction=0.3, tangent="y"), "a_friction": Coulomb(at="x", friction=0.1)}
+    with pytest.raises(ns.SystemDefinitionError, match="'a_friction' is the name of an element and of the friction"):
+        ns.mechanical(np.eye(2), np.eye(2), np.eye(2), coordinates=["x", "y"], elements=elements)

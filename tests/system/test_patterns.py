@@ -247,3 +247,26 @@ def test_an_instant_asks_the_elements_that_it_concerns(seed: int, monkeypatch: p
     np.testing.assert_array_equal(some["crossing_transition"].values, every["crossing_transition"].values)
     np.testing.assert_allclose(some["crossing_time"].values, every["crossing_time"].values, rtol=0, atol=1e-11)
     np.testing.assert_allclose(some["u"].values, every["u"].values, rtol=0, atol=1e-11)
+
+
+def test_no_name_of_an_element_makes_conditions_of_two_others_its_own() -> None:
+    """Three frictions that hold each other, named a, b and a_b: a bound of what a and b hold is no bound of a_b."""
+
+    def ends(names: tuple[str, str, str]) -> np.ndarray:
+        rubs = [
+            Coulomb(at={"q1": 1, "q2": -1}, friction=0.35),
+            Coulomb(at={"q1": 0.3, "q2": 1}, friction=0.3),
+            Coulomb(at={"q1": 1, "q2": 1e-4}, friction=0.25),
+        ]
+        system = ns.mechanical(
+            np.eye(2),
+            0.05 * np.eye(2),
+            [[2.0, -1.0], [-1.0, 1.5]],
+            parameters={"F": 1.3, "w": 0.8},
+            forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+            elements=dict(zip(names, rubs, strict=True)),
+        )
+        assert system.traced.patterns is not None
+        return ns.simulate(system, periods=2).crossing_time.values
+
+    assert ends(("a", "a_b", "b")) == pytest.approx(ends(("a", "aa", "b")), abs=1e-9)

@@ -36,6 +36,7 @@ from nonsmooth.system.transition import Band, Mode, Surface
 if TYPE_CHECKING:
     from nonsmooth.system.derived.loads import Loads
 
+LOADS = ("force", "impulse", "impact_speed", "impacts", "energy", "energy_lost")  # of an element, in results
 IMPACTS = ("simultaneous", "sequential")
 EXAMPLES = {
     "parameters": '{"m": (0.838, "kg"), "k": 8.47}',
@@ -143,6 +144,9 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
     values = {symbol: known[key].value for key, symbol in symbols.p.items()}
     given |= {"scale": _scale(given["scale"], given["states"], name)}
     made = _with_elements(symbols, given, values)
+    make: Any = made.get("make")
+    before = given
+    loaded = [part.name for part in make.parts] if given["elements"] else []
     given = given | made  # `plain` goes on with what was given
     shown, bands, symmetry = given["outputs"], given["bands"], given["symmetry"]
     for key, band in bands.items():
@@ -155,8 +159,10 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
             "parameter": known,
             "memory": remembered,
             "mode": given["modes"],
-            "indicator": given["indicators"],
-            "output": shown,
+            "indicator": before["indicators"],
+            "output": before["outputs"],
+            "condition of an element": make.indicators if make else (),
+            "load of an element": [f"{key}_{load}" for key in loaded for load in LOADS],
             "memory of a band": sorted({key for band in bands.values() for key in (band.write or {})}),
             "sliding mode": [mode for _, mode in _slid(given["transitions"])],
         },
@@ -174,7 +180,7 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
     if given["elements"]:
         from nonsmooth.system.derived.loads import loads_of
 
-        loads = loads_of(made["make"])
+        loads = loads_of(make)
         units_out |= {f"{load.name}_force": "" for load in loads.elements}
     description = Description(
         name=name,

@@ -81,7 +81,8 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
     """Check that all names are identifiers, not reserved, and different across all ``groups``: the names by what they
     are ("state", "parameter", ...)."""
     seen: dict[str, str] = {}
-    extremes = {f"{o}_{which}": o for o in groups.get("output", ()) for which in ("maximum", "minimum")}
+    shown = (*groups.get("output", ()), *groups.get("load of an element", ()))
+    extremes = {f"{o}_{which}": o for o in shown for which in ("maximum", "minimum")}
     for what, names in groups.items():
         one = f"{'an' if what[0] in 'aeiou' else 'a'} {what}"
         for name in names:

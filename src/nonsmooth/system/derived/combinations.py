@@ -50,7 +50,13 @@ def element_names(elements: Any) -> dict[str, Element]:
                     f"elements: {shortened(name)} cannot name an element: modes and outputs are called after it "
                     "(left_stop_open), so it must be a Python identifier and not begin with an underscore"
                 )
-            found |= element.parts(name) if isinstance(element, Element) else {name: element}
+            own = element.parts(name) if isinstance(element, Element) else {name: element}
+            if twice := own.keys() & found.keys():
+                raise SystemDefinitionError(
+                    f"elements: {shortened(*twice)} is the name of an element and of the friction at a stop; give the "
+                    "element another name"
+                )
+            found |= own
         return found
     if isinstance(elements, (str, Element)) or not isinstance(elements, Sequence):
         raise SystemDefinitionError(

@@ -124,8 +124,7 @@ class Patterns:
         def armed(some: Sequence[Any]) -> Conditions:
             found = []
             for one in some:
-                own = f"{name}_{one.name}"
-                slot = self.slots[own if own in self.slots else one.name]
+                slot = self.slots[one.name if one.name in self.slots else f"{name}_{one.name}"]  # of which it is whole
                 conditions[slot] = one.value.values
                 found.append(TracedCondition(slot, one.sign, one.strict))
             return tuple(found)
