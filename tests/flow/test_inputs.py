@@ -495,3 +495,22 @@ def test_text_and_what_is_refused() -> None:
         ns.sweep(system, "k", [1.0, 2.0], progress=False)
     with pytest.raises(ValueError, match="has no inputs"):
         ns.simulate(ns.models.discontinuous_support(), periods=1, inputs={"f": ([0], [1])})
+
+
+def test_what_a_function_returns_by_name_has_its_input_beside_it() -> None:
+    """A cart of 2 kg under 3 N t, whose speed is set to 1 m/s at a phase."""
+
+    def cart(by_name: bool) -> ns.System:
+        kind: Callable[..., Any] = dict if by_name else lambda **values: tuple(values.values())
+        return ns.System(
+            states={"x": "m", "v": "m/s"},
+            parameters={"m": 2.0},
+            modes={"all": lambda t, u, p: kind(x=u.v, v=p.force / p.m)},
+            period=2.0,
+            transitions=[ns.Transition("all", "all", at=0.5, reset=lambda t, u, p: kind(x=u.x, v=1.0))],
+            inputs={"force": "N"},
+        )
+
+    for by_name in (True, False):
+        run = ns.simulate(cart(by_name), duration=2.0, inputs={"force": ([0, 2], [0, 6])})
+        np.testing.assert_allclose(run.u.values[-1, :2], [2.25, 3.25], atol=1e-13)

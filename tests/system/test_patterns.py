@@ -270,3 +270,26 @@ def test_no_name_of_an_element_makes_conditions_of_two_others_its_own() -> None:
         return ns.simulate(system, periods=2).crossing_time.values
 
     assert ends(("a", "a_b", "b")) == pytest.approx(ends(("a", "aa", "b")), abs=1e-9)
+
+
+def test_a_system_written_out_is_the_same_in_another_process() -> None:
+    stops = {
+        "a": Stop(at="q1", position=0.5, restitution=0.5),
+        "b": Stop(at={"q1": 1, "q2": -1}, position=0.3, restitution=0.5),
+    }
+    system = ns.mechanical(
+        np.eye(2),
+        0.1 * np.eye(2),
+        [[2.0, -1.0], [-1.0, 2.0]],
+        parameters={"F": 1.0, "w": 0.8},
+        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+        elements=stops,
+    )
+    written = system.written_out()
+    run = ns.simulate(written, periods=3)
+    there = pickle.loads(pickle.dumps(written))
+    assert there.modes == written.modes and there.transitions == written.transitions
+    again = ns.simulate(there, periods=3)
+    assert len(run.crossing)
+    np.testing.assert_array_equal(again.crossing_transition, run.crossing_transition)
+    assert pickle.loads(pickle.dumps(system)).traced.patterns is not None

@@ -131,3 +131,19 @@ def test_every_reset_counts_though_transitions_have_one_label():
         between(lambda t, p: 0.1 * np.cos(p.w * t), period=lambda p: np.pi / p.w)
     with pytest.raises(SystemDefinitionError, match="w = 0"):
         between(lambda t, p: 0.1 / p.w).with_parameters(w=0.0)
+
+
+def test_a_given_period_holds_at_other_values_too():
+    """The forcing would begin anew at each multiple of a period that is not its own."""
+    system = forced(lambda t, u, p: np.cos(p.w * t), period=2 * np.pi / 3)
+    assert system.with_parameters(w=6.0).period() == pytest.approx(2 * np.pi / 3)
+    for one in (lambda: system.with_parameters(w=3.3), lambda: system.parameter_points({"w": [3.0, 4.5]})):
+        with pytest.raises(SystemDefinitionError, match="do not repeat after the period .* function of p"):
+            one()
+    again = System.from_text(system.with_parameters(w=6.0, b=0.1).to_text())
+    with pytest.raises(SystemDefinitionError, match="do not repeat"):
+        again.with_parameters(w=3.3)
+    even = forced(lambda t, u, p: np.cos(p.w * t) ** 2, period=np.pi / 3)  # half a turn of the wave
+    assert even.with_parameters(w=9.0).period() == pytest.approx(np.pi / 3)
+    with pytest.raises(SystemDefinitionError, match="do not repeat"):
+        even.with_parameters(w=4.5)

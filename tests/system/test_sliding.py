@@ -11,7 +11,7 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.codegen.linear import linear_form
 from nonsmooth.system.system import System
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Mode, Surface, Transition
 
 
 def friction(belt: Any = lambda t, p: p.v_b, transitions: Any = (), **surface: Any) -> System:
@@ -246,3 +246,28 @@ def test_texts_leave_out_where_runs_end():
     assert "not_unique" not in str(system)
     assert r"not\_unique" not in latex
     assert latex.count(r"\dot{z}") == 3
+
+
+def test_a_jump_that_begins_no_contact_begins_none_while_motion_slides() -> None:
+    """Friction, and a wall whose impact, or a controller whose push, is a transition of both modes alike."""
+    for contact in (True, False):
+        ways = [
+            Transition(k, k, at=0.5, reset=lambda t, u, p: (u.x, u.v + 3), contact=contact) for k in ("slow", "fast")
+        ]
+        system = friction(transitions=ways)
+        assert [jump.contact for jump in system.transitions if jump.at is not None] == 3 * [contact]
+
+
+def test_a_surface_of_a_state_that_its_modes_lack_is_refused() -> None:
+    modes: dict[str, Any] = {
+        "left": Mode(lambda t, u, p: (1.0,), states=["x"]),
+        "right": Mode(lambda t, u, p: (-1.0,), states=["x"]),
+    }
+    with pytest.raises(SystemDefinitionError, match="'h' involves the state 'y', which mode 'left' does not have"):
+        System(
+            states=["x", "y"],
+            parameters={},
+            modes=modes,
+            indicators={"h": lambda t, u, p: u.x - u.y},
+            transitions=[Surface("h", below="left", above="right")],
+        )

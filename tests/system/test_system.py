@@ -9,7 +9,7 @@ import pytest
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.models import discontinuous_support
 from nonsmooth.system.system import System
-from nonsmooth.system.transition import Band, Mode, Surface, Transition
+from nonsmooth.system.transition import Band, Mode, Surface, Transition, read_condition
 
 
 def free(t, u, p):
@@ -356,3 +356,8 @@ def test_repr_and_latex_show_the_equations():
     assert "eta = 1e-05" in repr(system.smoothed(1e-5))
     assert r"\rho \cos" in system.to_latex()
     assert system._repr_latex_().startswith(r"\begin{align*}")
+
+
+@pytest.mark.parametrize("when", ["gap >= 0 and gap > 0", "gap > 0 and gap >= 0"])
+def test_a_strict_sign_beside_the_same_one_that_is_not_is_strict(when):
+    assert read_condition(when, ["gap"], "") == (("gap", 1, True),)

@@ -26,7 +26,7 @@ from nonsmooth.system.inputs import input_states, read_inputs, with_inputs
 from nonsmooth.system.kinds import real_number
 from nonsmooth.system.names import check_names
 from nonsmooth.system.parameter import Parameter
-from nonsmooth.system.symbolic.domain import Domain, check_period, forcing_period, timed_expressions
+from nonsmooth.system.symbolic.domain import Domain, check_period, forcing_period, repeating, timed_expressions
 from nonsmooth.system.symbolic.scalar import to_expression
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
@@ -170,7 +170,7 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
     )
     traced, surfaces = _traced(symbols, given)
     _check_phases(traced)
-    traced, explicit = _with_period(traced, symbols, values, given["period"])
+    traced, explicit, repeats = _with_period(traced, symbols, values, given["period"])
     if symmetry is not None:
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
     if made.get("bind") is not None:
@@ -194,7 +194,7 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
         explicit_time=explicit,
-        ranges=tuple(made.get("ranges", ())),
+        ranges=(*made.get("ranges", ()), *repeats),
         plain=made.get("plain"),
         loads=loads,
         inputs=given["inputs"],
@@ -308,8 +308,9 @@ def _scale(given: Mapping[str, float] | None, states: Mapping[str, str], system:
 
 def _with_period(
     traced: Traced, symbols: Symbols, values: Mapping[sp.Symbol, float], given: Any
-) -> tuple[Traced, bool]:
-    """Return the system with its period, and whether it depends on the time without one."""
+) -> tuple[Traced, bool, list[tuple[sp.Expr, str]]]:
+    """Return the system with its period, whether it depends on the time without one, and what must not be negative for
+    it to repeat at other values of the parameters."""
     expressions = timed_expressions(traced)
     timed = any(traced.t in expression.free_symbols for _, expression in expressions)
     found = forcing_period([expression for _, expression in expressions], traced.t, values)
@@ -329,12 +330,14 @@ def _with_period(
             f"transition {jump.label}: `at` is a phase of the forcing, but no forcing period can be read off the "
             f"equations; give period= (a number, or a function of p)"
         )
-    traced = replace(traced, period=period)
+    traced, repeats = replace(traced, period=period), list[tuple[sp.Expr, str]]()
     if period is not None and timed and period != found:
         Domain(traced).check({name: values[symbol] for name, symbol in symbols.p.items()})
         plain = str(period.subs({symbol: sp.Symbol(name) for name, symbol in symbols.p.items()}))
         check_period(traced, expressions, [*values.values()], float(period.subs(values)), plain)
-    return traced, timed and period is None
+        says = f"the equations do not repeat after the period {plain}: give it as a function of p"
+        repeats = [(e, says) for e in repeating((e for _, e in expressions), traced.t, period, values)]
+    return traced, timed and period is None, repeats
 
 
 def _check_phases(traced: Traced) -> None:

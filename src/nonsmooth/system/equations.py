@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import sympy as sp
@@ -80,12 +81,20 @@ def trace_system(
         if isinstance(item, Surface):
             jumps += _surface_jumps(item, owned, indicators)
         elif isinstance(item, Transition):
-            jumps.append(_jump(item, symbols, owned, indicators, surfaces_of))
+            jumps.append(_jump(item, symbols, owned, indicators))
         else:
             raise SystemDefinitionError(
                 f"{name!r}: `transitions` is a list of ns.Transition and ns.Surface, not {shortened(item)}; "
                 'write ns.Transition("free", "contact", when="gap > 0")'
             )
+    for jump in jumps:
+        mode = list(modes)[jump.source]
+        for row, state in product(jump.rows, everything):
+            if state not in owned[mode] and surfaces_of[row.indicator].has(symbols.u[state]):
+                raise SystemDefinitionError(
+                    f"transition {jump.label}: the indicator {list(indicators)[row.indicator]!r} involves the state "
+                    f"{state!r}, which mode {mode!r} does not have"
+                )
     return Traced(
         name=name,
         **symbols.of_traced(),
@@ -170,7 +179,6 @@ def _jump(
     symbols: Symbols,
     modes: Mapping[str, tuple[str, ...]],
     indicators: Mapping[str, Any],
-    expressions: Sequence[sp.Expr],
 ) -> TracedTransition:
     label = f"transition {item.label}"
     source, target = (_mode_index(end, item.label, modes) for end in (item.source, item.target))
@@ -179,13 +187,6 @@ def _jump(
     if item.when is not None:
         conditions = read_condition(item.when, order, label)
         rows = tuple(TracedCondition(order.index(key), sign, strict) for key, sign, strict in conditions)
-    hidden = {symbols.u[state]: state for state in symbols.u if state not in before}
-    for row in rows:
-        for symbol in expressions[row.indicator].free_symbols & hidden.keys():
-            raise SystemDefinitionError(
-                f"{label}: the indicator {order[row.indicator]!r} involves the state {hidden[symbol]!r}, which mode "
-                f"{item.source!r} does not have"
-            )
     arguments = symbols.arguments(before, f"mode {item.source!r}")
     reset = None
     if item.reset is not None:

@@ -54,13 +54,13 @@ def with_inputs(given: Mapping[str, Any]) -> dict[str, Any]:
             raise SystemDefinitionError(f"{name!r}: a system with inputs has no `{what}`: leave it out")
     states = input_states(inputs).values()
     more = {name: unit for own in states for name, unit in own.items()}
-    rates = [rate for own in states for rate in (*list(own)[1:], None)]
+    rates = {key: rate for own in states for key, rate in zip(own, (*list(own)[1:], None), strict=True)}
 
     def moved(function: Callable[..., Any]) -> Callable[..., Any]:
-        return _longer(function, lambda p: [0.0 if rate is None else p[rate] for rate in rates])
+        return _longer(function, lambda p: {key: 0.0 if rate is None else p[rate] for key, rate in rates.items()})
 
     def kept(function: Callable[..., Any]) -> Callable[..., Any]:
-        return _longer(function, lambda p: [p[key] for key in more])
+        return _longer(function, lambda p: {key: p[key] for key in more})
 
     def of_mode(mode: Mode) -> Mode:
         return Mode(moved(mode.field), states=None if mode.states is None else [*mode.states, *more])
@@ -80,7 +80,7 @@ def with_inputs(given: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _longer(function: Callable[..., Any], more: Callable[[Any], list[Any]]) -> Callable[..., Any]:
+def _longer(function: Callable[..., Any], more: Callable[[Any], dict[str, Any]]) -> Callable[..., Any]:
     """A function with a vector as its result, and the entries of inputs behind those."""
     if not callable(function):
         return function
@@ -88,7 +88,9 @@ def _longer(function: Callable[..., Any], more: Callable[[Any], list[Any]]) -> C
     @functools.wraps(function)
     def whole(*arguments: Any) -> Any:
         found = function(*arguments)
+        if isinstance(found, Mapping):
+            return {**found, **more(arguments[-1])}
         entries = list(found) if hasattr(found, "__iter__") else [found]
-        return [*entries, *more(arguments[-1])]
+        return [*entries, *more(arguments[-1]).values()]
 
     return whole

@@ -391,7 +391,7 @@ class System(Answering):
 
     def __reduce__(self) -> tuple[Any, ...]:
         known = self.traced.known
-        return System.from_text, (self.to_text(),), known and known.sent()
+        return _sent, (self.to_text(), self.traced.patterns is None), known and known.sent()
 
     def __setstate__(self, sent: Any) -> None:
         self.traced.known.receive(sent)
@@ -421,3 +421,9 @@ class System(Answering):
 
     def _repr_latex_(self) -> str | None:
         return None if self.traced.patterns is not None else self.to_latex()
+
+
+def _sent(text: str, written: bool) -> System:
+    """The system of a text, ``written`` out where it was so: modes and transitions have the same numbers."""
+    system = System.from_text(text)
+    return system.written_out() if written else system

@@ -205,11 +205,13 @@ def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple
                 "('or' is a second transition; anything else is a new indicator: for x > g declare "
                 'indicators={"gap": lambda t, u, p: u.x - p.g} and write "gap > 0".)'
             )
-        name, sign = match[1], (1 if match[2] == ">" else -1, not match[3])
+        name, sign = match[1], 1 if match[2] == ">" else -1
         if name not in indicators:
             raise SystemDefinitionError(f"{label}: {unknown(name, 'an indicator', 'this system', indicators)}")
-        if signs.setdefault(name, sign)[0] != sign[0]:
+        before, strict = signs.get(name, (sign, False))
+        if before != sign:
             raise SystemDefinitionError(f"{label}: {shortened(text)} asks for both signs of {name!r} at once")
+        signs[name] = sign, strict or not match[3]
     return tuple((name, sign, strict) for name, (sign, strict) in signs.items())
 
 

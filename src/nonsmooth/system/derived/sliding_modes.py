@@ -276,7 +276,7 @@ class SlidingModes(Additions):
             )
         target = self.cells.index(targets) if first.reset is None else first.target
         label = f"{self.modes[slid]} -> {self.modes[target]}"
-        return replace(first, source=slid, target=target, label=label, contact=first.reset is not None)
+        return replace(first, source=slid, target=target, label=label, contact=all(jump.contact for jump in group))
 
 
 def _agree(traced: Traced, one: Field, two: Field) -> bool:

@@ -21,6 +21,8 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.symbolic.numeric import numeric
 from nonsmooth.system.symbolic.traced import Traced
 
+REPEATS = 1e-6  # radians that a wave may be off after a period, or twice what it is where the system is defined
+
 
 def timed_expressions(traced: Traced) -> list[tuple[str, sp.Expr]]:
     """All expressions in which the time may occur, each with what it is; several transitions may have one label."""
@@ -55,6 +57,21 @@ def forcing_period(expressions: Sequence[sp.Expr], t: sp.Symbol, values: Mapping
     # gcd of fractions: gcd of the numerators over lcm of the denominators
     base = sp.Rational(sp.igcd(*(r.p for r in ratios), 0), sp.ilcm(*(r.q for r in ratios), 1))
     return 2 * sp.pi / (base * frequencies[0])
+
+
+def repeating(
+    expressions: Iterable[sp.Expr], t: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, float]
+) -> list[sp.Expr]:
+    """Return expressions of the parameters that are not negative where harmonics repeat after a given period, as they
+    do at some ``values``: those of which it is no multiple by form."""
+    frequencies: list[sp.Expr] = []
+    for expression in expressions:
+        _collect(expression, t, values, frequencies)
+    turns = [sp.cancel(frequency * period / sp.pi) for frequency in frequencies]
+    # half a turn is whole where a wave stands in an even power
+    shares = [(half, 1 if round(float(half.subs(values))) % 2 else 2) for half in turns if half.free_symbols]
+    off = [sp.Abs(sp.sin(sp.pi * half / share)) for half, share in shares]
+    return [max(REPEATS, 2.0 * float(one.subs(values))) - one for one in off]
 
 
 def _simple(ratio: sp.Expr) -> sp.Expr:
