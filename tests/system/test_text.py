@@ -348,3 +348,22 @@ def test_a_condition_within_where_is_read():
     for k, c, g, expected in ((2, 2, 0, 1.0), (2, 0, 0, np.sin(0.5)), (0, 0, 1, 1.0)):
         numbers = {parameters["k"]: k, parameters["c"]: c, parameters["g"]: g}
         assert float(value.subs(numbers)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("mode", [None, "stuck"])
+def test_a_surface_beside_an_element_is_read_back(mode):
+    """Sliding beside each state of the element is a mode of its own, called after both."""
+    system = System(
+        states=["x", "v", "y"],
+        parameters={"mu": 0.3},
+        modes={
+            "low": lambda t, u, p: (u.v, np.cos(t) - u.x, 1.0),
+            "high": lambda t, u, p: (u.v, np.cos(t) - u.x, -1.0),
+        },
+        indicators={"h": lambda t, u, p: u.y - 0.2},
+        transitions=[Surface("h", "low", "high", mode=mode)],
+        elements={"rub": Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction="mu")},
+    )
+    again = System.from_text(system.to_text())
+    assert again == system and again.modes == system.modes
+    assert again.modes[6:] == tuple(f"{mode or 'h_sliding'}_rub_{one}" for one in ("stick", "forward", "back"))

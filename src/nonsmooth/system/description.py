@@ -145,8 +145,7 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
     given |= {"scale": _scale(given["scale"], given["states"], name)}
     made = _with_elements(symbols, given, values)
     make: Any = made.get("make")
-    before = given
-    loaded = [part.name for part in make.parts] if given["elements"] else []
+    before, own_parts = given, make.parts if given["elements"] else ()
     given = given | made  # `plain` goes on with what was given
     shown, bands, symmetry = given["outputs"], given["bands"], given["symmetry"]
     for key, band in bands.items():
@@ -162,7 +161,7 @@ def describe(asked: Mapping[str, Any], written: bool = False) -> Description:
             "indicator": before["indicators"],
             "output": before["outputs"],
             "condition of an element": make.indicators if make else (),
-            "load of an element": [f"{key}_{load}" for key in loaded for load in LOADS],
+            "load of an element": [f"{part.name}_{load}" for part in own_parts for load in LOADS],
             "memory of a band": sorted({key for band in bands.values() for key in (band.write or {})}),
             "sliding mode": [mode for _, mode in _slid(given["transitions"])],
         },

@@ -21,6 +21,7 @@ from nonsmooth.system.derived.assembly import Pattern, VaryingError
 from nonsmooth.system.derived.decider import Decider
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.expressions import Expressions
+from nonsmooth.system.equations import sliding_mode
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols, call_vector
 from nonsmooth.system.transition import Mode, Surface, Transition
@@ -158,8 +159,9 @@ def _written_out(
             asked.append((here, TOGETHER, " and ".join(met), -1))
         for item in given["transitions"]:
             if isinstance(item, Surface) and item.below == mode:
-                ends = name(item.below, pattern), name(item.above, pattern)
-                transitions.append(replace(item, below=ends[0], above=ends[1]))
+                own = item.below, item.above, sliding_mode(item, given["transitions"])
+                below, above, slid = (name(key, pattern) for key in own)
+                transitions.append(replace(item, below=below, above=above, mode=slid))
                 if make.asks:
                     raise SystemDefinitionError(
                         f"{item.label}: a surface on which motion may slide cannot stand beside elements whose forces "

@@ -160,9 +160,10 @@ class Instant:
                 back = np.array([0.0 if last else e[i] for i in bearing])
                 change = -inverse @ ((1.0 + back)[:, None] * rates[bearing])
                 slopes[bearing] += change
-                impulses[bearing] += found[[some.index(i) for i in bearing]]
+                push = found[found > 0.0]
+                impulses[bearing] += push
                 after = -back * v[bearing]
-                v, rates = v + G[:, bearing] @ found[[some.index(i) for i in bearing]], rates + G[:, bearing] @ change
+                v, rates = v + G[:, bearing] @ push, rates + G[:, bearing] @ change
                 v[bearing] = after
             if last:
                 break
