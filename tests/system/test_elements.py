@@ -557,3 +557,36 @@ def test_the_friction_at_a_stop_is_no_other_element() -> None:
     elements = {"a": Stop(at="x", position=1.0, friction=0.3, tangent="y"), "a_friction": Coulomb(at="x", friction=0.1)}
     with pytest.raises(ns.SystemDefinitionError, match="'a_friction' is the name of an element and of the friction"):
         ns.mechanical(np.eye(2), np.eye(2), np.eye(2), coordinates=["x", "y"], elements=elements)
+
+
+def test_the_table_of_a_system_shows_what_stands_beside_its_elements() -> None:
+    """The user's own switch, also where it begins with the name of an element, and a surface, each once."""
+    system = ns.System(
+        states=["x", "v", "y"],
+        parameters={},
+        modes={"low": lambda t, u, p: (u.v, -u.x, 1.0), "high": lambda t, u, p: (u.v, -u.x, -1.0)},
+        indicators={"rub_top": lambda t, u, p: u.x - 1.0, "rub_plane": lambda t, u, p: u.y},
+        transitions=[
+            ns.Surface("rub_plane", "low", "high"),
+            ns.Transition("low", "high", when="rub_top > 0 and rub_plane < 0"),
+        ],
+        elements={"rub": Coulomb(speed=lambda t, u, p: u.v, friction=0.1, on={"v": 1.0})},
+    )
+    lines = [" ".join(line.split()) for line in str(system).splitlines()]
+    assert "indicator rub_top -1 + x" in lines and not any("rub_speed" in line for line in lines)
+    assert sum("crossed or slid on" in line for line in lines) == 1
+    assert not any("rub_stick" in line for line in lines)
+    assert [line for line in lines if "mode" in line[:4]][:2] == ["mode low x' = v", "mode high x' = v"]
+
+
+def test_the_table_of_a_system_shows_its_own_transitions_beside_elements() -> None:
+    floor = Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}, restitution=0.5)
+    system = ns.System(
+        states=["x", "v"],
+        parameters={},
+        modes={"fly": lambda t, u, p: (u.v, -1.0)},
+        indicators={"top": lambda t, u, p: u.x - 1.0},
+        transitions=[ns.Transition("fly", "fly", when="top > 0", reset=lambda t, u, p: (u.x, -u.v))],
+        elements={"floor": floor},
+    )
+    assert "fly -> fly  when top > 0, reset v := -v" in str(system)

@@ -54,11 +54,13 @@ def page(system: System) -> str:
 
 def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
     """Headings and texts: states, parameters, equations by mode, indicators, transitions, period."""
-    patterns, loads = system.traced.patterns, system._description.loads
-    traced = system.traced if patterns is None else patterns.plain
+    patterns, description = system.traced.patterns, system._description
+    loads = description.loads
+    short = bool(loads and loads.elements) and not system.is_smoothed and not verbose
+    given = description.plain if short or patterns is not None else None  # as it was, without elements
+    traced, surfaces = given() if given else (system.traced, system.surfaces)
     names = traced.named()
     lines: list[tuple[str, str]] = []
-    short = loads is not None and bool(loads.elements) and not system.is_smoothed and not verbose
 
     def listed(units: Mapping[str, str]) -> str:
         return ", ".join(f"{name} [{unit}]" if unit else name for name, unit in units.items())
@@ -68,33 +70,27 @@ def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
     lines.append(("parameters", ", ".join(values) or "none"))
     if system.memory:
         lines.append(("memory", listed(system.memory)))
-    modes = traced.mode_names, traced.fields, traced.lacking
-    if short and loads is not None:
-        modes = tuple(loads.fields), tuple(loads.fields.values()), len(loads.fields) * (traced.lacking[0],)
-    for mode, field, lacking in zip(*modes, strict=True):
+    for mode, field, lacking in zip(traced.mode_names, traced.fields, traced.lacking, strict=True):
         if mode.endswith(NOT_UNIQUE):  # a run that comes there ends
             continue
-        head = "equations" if short and len(modes[0]) == 1 else f"mode {mode}"
+        head = "equations" if given and len(traced.fields) == 1 else f"mode {mode}"
         for name, e, gone in zip(traced.state_names, field, lacking, strict=True):
             if not gone:
                 lines.append((head, f"{name}' = {write_expression(e, names)}"))
                 head = ""
     if loads is not None:
         lines += [("elements" if k == 0 else "", f"{one.name}: {one.text}") for k, one in enumerate(loads.elements)]
-    n = len(system._description.traced.indicator_names)  # those derived for a band are named by their formula
-    own = [f"{one.name}_" for one in loads.elements] if short and loads is not None else []
+    n = len((traced if given else description.traced).indicators)  # those derived for a band are named by their formula
     for name, e in zip(traced.indicator_names[:n], traced.indicators, strict=False):
-        if any(name.startswith(one) for one in own):
-            continue
         lines.append((f"indicator {name}", write_expression(e, names)))
-    for surface in system.surfaces:
+    for surface in surfaces:
         text = f"{traced.mode_names[surface.below]} | {traced.mode_names[surface.above]}, crossed or slid on"
         if surface.static is not None:
             text += f", static {write_expression(surface.static, names)}"
         lines.append((f"surface {traced.indicator_names[surface.indicator]}", text))
-    either_side = {frozenset((surface.below, surface.above)) for surface in system.surfaces}
+    either_side = {frozenset((surface.below, surface.above)) for surface in surfaces}
     head = "transitions"
-    for jump in system.declared.transitions if patterns is None and not short else ():
+    for jump in (traced if given else system.declared).transitions:
         if frozenset((jump.source, jump.target)) not in either_side:
             lines.append((head, _jump(jump, traced, names)))
             head = ""
