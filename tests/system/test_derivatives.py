@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+import nonsmooth as ns
 from nonsmooth.models import discontinuous_support, impact_oscillator, relief_valve
 
 MODELS = [discontinuous_support(), discontinuous_support().smoothed(1e-2), impact_oscillator(), relief_valve()]
@@ -77,3 +78,25 @@ def test_resets_and_writes():
 def test_all_copies_share_the_derivatives():
     system = relief_valve()
     assert system.with_parameters(q=3.0).derivatives is system.derivatives
+
+
+def test_an_angle_that_is_wrapped_has_the_derivatives_of_one_that_is_turned_back():
+    """A rotor, turned back at 6.5 by one turn: by np.remainder, whose floor has no slope, and by 2 pi."""
+
+    def rotor(reset):
+        return ns.System(
+            states=["phi", "w"],
+            parameters={"c": 0.5, "M": 1.3},
+            modes={"only": lambda t, u, p: (u.w, p.M - p.c * u.w + 0.4 * np.sin(u.phi))},
+            indicators={"h": lambda t, u, p: u.phi - 6.5},
+            transitions=[ns.Transition("only", "only", when="h > 0", reset=reset)],
+        )
+
+    back = rotor(lambda t, u, p: (u.phi - 2 * np.pi, u.w))
+    wrapped = rotor(lambda t, u, p: (np.remainder(u.phi, 2 * np.pi), u.w * np.sign(u.w) ** 2))
+    one, other = (
+        ns.sensitivity(system, duration=17.0, start={"w": 1.0}, parameters=["c", "M"]) for system in (back, wrapped)
+    )
+    assert one.sizes["crossing"] == 6
+    np.testing.assert_allclose(other.Phi, one.Phi, rtol=1e-9)
+    np.testing.assert_allclose(other.P, one.P, rtol=1e-9)

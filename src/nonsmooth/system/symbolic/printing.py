@@ -48,6 +48,8 @@ CORNERS = (
     sympy.floor,
     sympy.ceiling,
 )
+#: What derivatives of floor, ceiling and sign are to SymPy; they are zero but where these jump.
+STEPS = sympy.Subs, sympy.Derivative, sympy.DiracDelta
 RELATIONS: dict[type, str] = {
     sympy.Gt: ">",
     sympy.Ge: ">=",
@@ -83,6 +85,8 @@ class Printer:
         """(text, whether it stands in a product or a power without parentheses)."""
         if e in self.names:
             return self.names[e], True
+        if isinstance(e, STEPS):
+            return "0.0", True
         if isinstance(e, sympy.Number | sympy.NumberSymbol):
             text = _number(e)
             return text, not text.startswith("-")
@@ -227,7 +231,7 @@ def shared_terms(
     order: list[Basic] = []
 
     def visit(e: Basic) -> None:
-        if e in printer.names or not e.args:
+        if e in printer.names or not e.args or isinstance(e, STEPS):
             return
         counts[e] = counts.get(e, 0) + 1
         if counts[e] == 1:
