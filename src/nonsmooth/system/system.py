@@ -56,7 +56,8 @@ class System(Answering):
     scale : mapping of str to float, optional
         Typical sizes of the states (1 where missing): used by every norm and tolerance.
     period : float or callable, optional
-        Forcing period, a number or a function of ``p``; read off sin and cos of ``w * t`` where not given.
+        Forcing period, a number or a function of ``p``; read off sin and cos of ``w * t`` where not given. Values at
+        which the equations do not repeat after it are refused.
     bands : mapping of str to Band, optional
         Fields prescribed inside the bands of the smoothed system, by indicator.
     elements : mapping of str to element, or sequence, optional
