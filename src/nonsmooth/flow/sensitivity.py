@@ -83,7 +83,10 @@ class Variation:
         for step, product in zip(steps, products, strict=True):
             total = step.dot(total, out=product)  # of small matrices three times as quick as @
         self.D, self.rate = products[is_sample, :n][back], legs.f_end[is_sample][back]
-        self.of_time = self.rate - self.D[:, :, :n] @ legs.f_begin[0]
+        rate = legs.f_begin[0].copy()
+        if course is not None:  # inputs have their course, whenever the run begins
+            rate[course.first :] = 0.0
+        self.of_time = self.rate - self.D[:, :, :n] @ rate
         if self.start is not None:  # transitions that are taken at once, whenever the run begins
             self.of_time += self.D[:, :, :n] @ self.start.R_t
             self.D = self.D @ self.start.R

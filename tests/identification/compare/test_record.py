@@ -91,6 +91,19 @@ def test_a_sensor_is_read_as_the_fit_read_it() -> None:
     assert found["difference_over_noise"].values == pytest.approx(1.0, abs=0.05)
 
 
+def test_a_motion_begins_where_that_of_a_fit_began_which_found_a_delay() -> None:
+    t = T[:400]
+    force = pushed(2, t)
+    true, _ = driven(t, force, C, 4.0, WALL, 0.7)
+    noise = 0.01 * np.random.default_rng(1).normal(size=len(t))
+    read, given = {"laser": (t + 0.13, true[:, 0] + noise)}, {"force": (t, force)}
+    asked = {"inputs": given, "measured": {"q": "laser"}, "tries": 1, "progress": False}
+    fitted = ns.fit(mass(), read, ["k", "q.delay"], **asked)
+    found = ns.compare(read, mass(), inputs=given, channels={"q": "laser"}, parameters=fitted, draws=0)
+    np.testing.assert_allclose(found["theory"].values[:, 0], true[:, 0], atol=5e-3)
+    assert found["difference_over_noise"].values == pytest.approx(1.0, abs=0.05)
+
+
 def test_what_is_missing_is_said() -> None:
     read, given = {"q": (T, np.sin(T))}, {"force": (T, np.cos(T))}
     with pytest.raises(ValueError, match="nothing says with which q, v_q: give start=, or parameters= as the fit"):

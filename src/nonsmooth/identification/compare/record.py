@@ -39,12 +39,11 @@ def compare_record(problem: Windows, model: Model, start: Any) -> dict[str, Any]
     (record,), sensors = problem.records, problem.sensors.values()
     found = {} if start is not None else _found_start(problem, model.parameters)
     begun = first_state(problem.system, found if start is None else start)
-    early, n = max(0.0, *(one.delay for one in sensors)), len(record.time)
     window = Window(
         0,
         0,
-        n,
-        float(record.time[0]) - early,
+        len(record.time),
+        float(record.time[0]),
         np.concatenate([begun.u, begun.memory]),
         np.zeros(problem.marcher.flow.n),
         int(begun.counters[0]),
@@ -112,10 +111,6 @@ def _found_start(problem: Windows, found: Any) -> dict[str, float]:
         raise ValueError(
             f"under measured inputs a motion begins where the record does, and nothing says with which "
             f"{', '.join(missing)}: give start=, or parameters= as the fit of these readings returns them"
-        )
-    if late := [key for key in extra if key.split(",")[0].endswith(".delay")]:
-        raise ValueError(
-            f"the fit found {late[0]!r}, and its start lies as long before the record as that could be: give start="
         )
     return {name: extra[row].value for name, row in known.items()}
 

@@ -254,7 +254,7 @@ def _others(stage: Stage, i: int, rng: np.random.Generator) -> list[tuple[Window
     told, run = told_start(problem, theta, window), window.record
     found = [(window, stage.starts[i])]
     if i and problem.pieces[i - 1].record == run:
-        before, begin = problem.pieces[i - 1], np.array([problem.at(theta, run).clock * window.begin])
+        before, begin = problem.pieces[i - 1], problem.at(theta, run).begun(np.array([window.begin]))
         motion = problem.march(theta, run, before.begin, begin, stage.starts[i - 1], before.mode)
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))

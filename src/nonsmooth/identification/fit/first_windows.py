@@ -57,11 +57,6 @@ def first_windows(
     found: list[Window] = []
     for i, record in enumerate(problem.records):
         here, u = problem.at(theta, i), problem.unknowns
-        early = max(here.delays.max(), 0.0)  # a window begins by the longest delay before its first sample
-        for k, (_, what) in zip(u.places[i][len(u.active) :], u.sensors, strict=False):
-            if what == "delay":
-                most, step = u.high[k], np.median(np.diff(record.time))
-                early = max(early, most if np.isfinite(most) else early + 10 * step)
         told = states_from_samples(problem, theta, i, slice(None))
         z = np.concatenate([np.zeros(n_u) if start is None else start[i], memory])
         if here.values is None:
@@ -75,9 +70,9 @@ def first_windows(
             end = max(np.searchsorted(time, until, "right"), first + 2)
             known = np.append(np.isfinite(told[first]), np.zeros(len(memory), bool))
             set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
-            begin = float(time[first]) - early
+            begin = float(time[first])
             for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
-                motion = problem.march(theta, i, begin, here.clock * (time[first:end] - early), candidate, mode)
+                motion = problem.march(theta, i, begin, here.begun(time[first:end]), candidate, mode)
                 if motion is not None:
                     break
             if motion is None:  # the samples of this window come back when windows are joined

@@ -93,7 +93,8 @@ def fit(
         0.9 and 1.1) and ``"phase"`` (of the forcing at t = 0, in periods, for each run). A mapping gives bounds (None:
         none).
     start : mapping or sequence of floats, optional
-        First guess of the states at the first sample; measured states need none.
+        First guess of the states that the first sample shows (by the longest delay of a sensor); measured states need
+        none.
     mode : str or mapping of str to str, optional
         Mode in which the recording begins, or each run of it. Where not given, each one is tried in which a motion may
         begin there (a relay with hysteresis: both), and a note says which fits best and by how much.

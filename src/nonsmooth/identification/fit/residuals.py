@@ -30,7 +30,7 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         assert motion is not None
         predicted, _ = problem.readings(theta, window, motion, False)
         k, c = window.readings
-        here = problem.samples_of(theta, window, motion)
+        here = problem.samples_of(theta, window)
         shown = problem.shown(window, predicted)
         parts.append(
             {

@@ -24,7 +24,7 @@ class Window:
     first, last : int
         Its samples: ``first <= k < last``.
     begin : float
-        Time of its start on the record's clock: that of its first sample, less the longest delay.
+        Time of its first sample: the motion begins with what this shows, the longest delay before it.
     start : array (n,)
         States and memory at its start.
     spread : array (n,)

@@ -42,6 +42,10 @@ class There(NamedTuple):
         """Delay of each sensor."""
         return np.array([sensor.delay for sensor in self.sensors.values()])
 
+    def begun(self, time: Any) -> Any:
+        """The instants of the system that samples at these times of the recording show first: by the longest delay."""
+        return self.clock * time - self.delays.max()
+
 
 @dataclass(frozen=True, eq=False)
 class Windows:
@@ -185,7 +189,7 @@ class Windows:
             """Sum of the squared residuals of each sample, over the noise."""
             left = window.values[window.readings] - self.readings(theta, window, one, False)[0]
             squares = (left / self.noise[window.readings[1]]) ** 2
-            return np.bincount(self.samples_of(theta, window, one), squares, len(one.time)).astype(float)
+            return np.bincount(self.samples_of(theta, window), squares, len(one.time)).astype(float)
 
         return sided(self.marcher.flow, values, motion, self.reach * self.steps[window.record].min(), jumps, misfit)
 
@@ -194,12 +198,10 @@ class Windows:
         assert values is not None
         return values
 
-    def samples_of(self, theta: FloatArray, window: Window, motion: SampledRun) -> IntArray:
+    def samples_of(self, theta: FloatArray, window: Window) -> IntArray:
         """The sample of the motion of each reading."""
         (k, c), there = window.readings, self.at(theta, window.record)
-        shift = motion.time[0] - self.instants(theta, window)[0]
-        at = np.searchsorted(motion.time, there.clock * window.time[k] - there.delays[c] + shift - 1e-12 * abs(shift))
-        return np.minimum(at, len(motion.time) - 1)
+        return np.searchsorted(self.instants(theta, window), there.clock * window.time[k] - there.delays[c])
 
     def march(
         self,
@@ -210,16 +212,15 @@ class Windows:
         start: FloatArray,
         mode: int,
     ) -> SampledRun | None:
-        """A motion from an instant of a run to times of its corrected clock; None where it does not come to its end."""
-        values, _, clock, phase = self.at(theta, run)
-        begin *= clock
-        if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
+        """A motion from what a sample at ``begin`` shows to times of the corrected clock; None where it comes to no
+        end."""
+        there = self.at(theta, run)
+        if there.values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
             return None
-        if times[0] < begin:  # a delay beyond what its bounds allow
-            return None
-        period = self.system.period_at(values)
-        shift = 0.0 if period is None else phase * period
-        return self.marcher.run(values, begin + shift, times + shift, start, mode, self.records[run].drive)
+        period = self.system.period_at(there.values)
+        shift = 0.0 if period is None else there.phase * period
+        at = there.begun(begin) + shift
+        return self.marcher.run(there.values, at, times + shift, start, mode, self.records[run].drive)
 
     def instants(self, theta: FloatArray, window: Window) -> FloatArray:
         """Times on the record's corrected clock at which the motion is needed."""
@@ -235,9 +236,10 @@ class Windows:
         assert values is not None
         u, (k, c) = self.unknowns, window.readings
         n, a, p = self.marcher.flow.n, len(u.active), len(window.which)
+        longest = max(sensors, key=lambda name: sensors[name].delay)
         period, of_period = self.marcher.flow.period(values)
         predicted, table = np.empty(len(k)), np.zeros((len(k) if slopes else 0, p + n))
-        of_reading = self.samples_of(theta, window, motion)
+        of_reading = self.samples_of(theta, window)
         for j, (name, sensor) in enumerate(sensors.items()):
             rows = np.flatnonzero(c == j) if len(sensors) > 1 else slice(None)
             at = of_reading[rows]
@@ -252,8 +254,9 @@ class Windows:
             of_all, now, of_shift = readout.slopes(t, z, mode, values, *along)
             table[rows, p:], table[rows, :a] = sensor.gain * of_all[:, :n], sensor.gain * of_all[:, n:]
             for i, (quantity, what) in enumerate(u.sensors, start=a):
-                if quantity == name and what == "delay":
-                    table[rows, i] = -sensor.gain * now
+                if what == "delay":  # of the reading, and with the longest one the motion begins
+                    late, begun = quantity == name, quantity == longest
+                    table[rows, i] = sensor.gain * ((begun - late) * now - begun * of_shift)
                 elif quantity == name:
                     table[rows, i] = raw if what == "gain" else 1.0
             if u.clock:
