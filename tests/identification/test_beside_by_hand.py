@@ -21,7 +21,7 @@ def test_places_between_are_looked_at_where_the_farthest_is_of_another_piece(
     def motion(theta: np.ndarray, window: None, start: None) -> SimpleNamespace:
         return SimpleNamespace(log=SimpleNamespace(crossing_transition=np.arange(another_piece and theta[0] > 4.0)))
 
-    def cost(theta: np.ndarray, starts: list[None], weights: None) -> float:
+    def cost(theta: np.ndarray, starts: list[None]) -> float:
         return float(theta[0] ** 2 * (theta[0] != 5.0))
 
     monkeypatch.setattr(likelihood, "reduced", lambda *_: (np.eye(1),))

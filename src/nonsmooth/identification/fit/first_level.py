@@ -53,7 +53,7 @@ class Stage:
     @property
     def chi2(self) -> float:
         """Sum of the weighted squares there, those of the starts among them."""
-        return self.state.chi2(self.problem.weights(self.state))
+        return self.state.chi2(self.problem.weights(self.state, summed=True))
 
     @cached_property
     def misfits(self) -> FloatArray:

@@ -134,7 +134,6 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
             f"a posterior over {size} numbers ({p} unknowns and the starts of {len(problem.pieces)} windows) does not "
             f"mix; at most {_MOST}: fit a shorter part of the record"
         )
-    weights = problem.weights(problem.residuals(grown.theta, grown.starts))
 
     def log_density(x: FloatArray) -> float:
         theta, starts = x[:p], grown.starts.copy()
@@ -142,7 +141,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
             return -np.inf
         for value, place in zip(x[p:], at, strict=True):
             starts[place] = value
-        found = -0.5 * problem.cost(theta, starts, weights)
+        found = -0.5 * problem.cost(theta, starts)
         return found if np.isfinite(found) else -np.inf
 
     rng = np.random.default_rng(seed)
@@ -222,9 +221,8 @@ def _beside(grown: Grown) -> list[tuple[float, int, FloatArray]]:
     """Points where the sum of squares has risen less than a parabola, the lowest first: rise, unknown moved, place."""
     problem, theta, u = grown.problem, grown.theta, grown.problem.unknowns
     state = problem.residuals(theta, grown.starts, True)
-    weights = problem.weights(state)
     covariance = inverted(reduced(problem, state)[0] + u.precision)[0]
-    least, found = problem.cost(theta, grown.starts, weights), []
+    least, found = problem.cost(theta, grown.starts), []
     here = _transitions(problem, theta, grown.starts)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     reach = np.maximum(_NEARLY * errors, _APART * grown.apart if len(grown.apart) else 0.0)
@@ -236,7 +234,7 @@ def _beside(grown: Grown) -> list[tuple[float, int, FloatArray]]:
             if fars and not problem.steady and _transitions(problem, places[fars[-1]], grown.starts) == here:
                 fars = fars[-1:]  # the same piece as far as that
             for far in fars:
-                rise = problem.cost(places[far], grown.starts, weights) - least
+                rise = problem.cost(places[far], grown.starts) - least
                 if rise < _LESS * far**2:
                     found.append((rise, i, places[far]))
     return sorted(found, key=lambda row: row[0])

@@ -316,11 +316,10 @@ class Windows:
         """The windows with the residuals of their readings."""
         return [(w, r[:n]) for w, n, r in zip(self.pieces, self.counts, state.residuals, strict=True)]
 
-    def cost(self, theta: FloatArray, starts: FloatArray, weights: list[FloatArray] | None = None) -> float:
-        """Sum of squares, priors included."""
+    def cost(self, theta: FloatArray, starts: FloatArray) -> float:
+        """Sum of squares, or of the loss, priors included."""
         state, away = self.residuals(theta, starts), theta - self.unknowns.centre
-        weights = self.weights(state) if weights is None else weights
-        return state.chi2(weights) + float(away @ self.unknowns.precision @ away)
+        return state.chi2(self.weights(state, summed=True)) + float(away @ self.unknowns.precision @ away)
 
     def residuals(self, theta: FloatArray, starts: FloatArray, slopes: bool = False) -> Residuals:
         """Residuals of all windows, not finite where a motion does not come to its end; with derivatives on request."""
@@ -375,14 +374,15 @@ class Windows:
                     table[mine, k] = of[mine, a if what == "gain" else a + 1]
         return fitted, periodic, table
 
-    def weights(self, state: Residuals | None, starts: bool = True) -> list[FloatArray]:
-        """One over the standard deviation of each row; less for those that the loss weighs down. Those of the
-        ``starts``, which hold what a window does not determine, are no readings, and 0 on request."""
+    def weights(self, state: Residuals | None, starts: bool = True, summed: bool = False) -> list[FloatArray]:
+        """One over the standard deviation of each row; less for those that the loss weighs down: so that the sum of
+        squares falls as the loss does, or is the loss where it is ``summed``. Those of the ``starts``, which hold what
+        a window does not determine, are no readings, and 0 on request."""
         found = []
         for i, w in enumerate(self.pieces):
             weight = 1.0 / self.noise[w.readings[1]]
             if state is not None and np.isfinite(self.loss):
-                z = np.abs(state.residuals[i][: len(weight)] * weight)
-                weight = weight * np.sqrt(self.loss / np.maximum(z, self.loss))
+                part = self.loss / np.maximum(np.abs(state.residuals[i][: len(weight)] * weight), self.loss)
+                weight = weight * np.sqrt(part * (2.0 - part) if summed else part)
             found.append(np.concatenate([weight, starts / w.spread[w.free]]))
         return found
