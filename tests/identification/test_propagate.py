@@ -382,3 +382,21 @@ def test_a_branch_of_a_system_without_contacts_has_bands() -> None:
     omega, k = band["omega"].values, band["drawn_k"].values[:, None]
     expected = np.quantile(1 / np.hypot(k - omega**2, 0.15 * omega), band["quantile"].values, axis=0)
     np.testing.assert_allclose(band["maximum_quantiles"].sel(state="q").values, expected, rtol=2e-3)
+
+
+def test_draws_of_a_fit_stay_within_its_bounds(tmp_path: Any) -> None:
+    """A swing that grows, and a damping that cannot be negative: half of a normal law, whose mean is known."""
+    t = np.linspace(0.0, 20.0, 401)
+    s = ns.mechanical(1.0, "c", "k", coordinates=["q"], parameters={"c": 0.01, "k": 9.0})
+    y = np.exp(0.0005 * t) * np.cos(3.0 * t) + 0.05 * np.random.default_rng(1).standard_normal(len(t))
+    found = ns.fit(s, {"q": (t, y)}, {"c": (0.0, None), "k": None}, measured=["q"], tries=1, **QUIET)
+    assert found["c"] == 0.0
+    ns.save(found.to_dataset(), tmp_path / "found.nc")
+    kept = ns.ParameterSet.from_dataset(ns.load(tmp_path / "found.nc"))
+    for one in (found, kept, found.only("c")):
+        drawn = one.draw(4000)["c"]
+        assert drawn.min() >= 0.0
+        assert drawn.mean() == pytest.approx(found.uncertainty["c"] * np.sqrt(2 / np.pi), rel=0.05)
+    np.testing.assert_array_equal(found.draw(30)["k"], kept.draw(30)["k"])
+    band = ns.propagate(found, ns.simulate, s, duration=2.0, samples=3, start={"q": 1.0}, draws=40, **QUIET)
+    assert band["drawn_c"].min() >= 0.0

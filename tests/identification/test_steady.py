@@ -372,3 +372,13 @@ def test_a_force_that_only_the_response_tells_stays_where_it_is_until_then() -> 
         estimate = found.estimate(name)
         assert abs(estimate.value - value) < 4 * estimate.uncertainty, name
     assert found.uncertainty["F"] == pytest.approx(0.01, rel=0.15) and not found.anomalies  # that of the gain
+
+
+def test_what_records_say_against_a_model_is_said_beside_readings_of_steady_states() -> None:
+    """A second force that the model lacks: short windows fit better, whatever amplitudes are fitted with the record."""
+    t, forces = np.arange(0.0, 30.0, 0.05), ((2.0, 1.0), (5.3, 0.05))
+    q = sum((f * np.exp(1j * w * t) / (9.0 - w**2 + 0.2j * w)).real for w, f in forces)
+    record = {"q": (t, q + 2e-3 * np.random.default_rng(0).standard_normal(len(t)))}
+    for readings in ([record], [record, response(amplitude(k=9.0, F=1.0))]):
+        found = ns.fit(linear(k=9.0, F=1.0), readings, ["k", "c"], measured=["q"], tries=1, progress=False)
+        assert any("short windows with starts of their own fit better" in one for one in found.anomalies)

@@ -15,8 +15,10 @@ from nonsmooth.errors import Answering, check_keys
 from nonsmooth.identification.finding import Estimate, Finding, normal_draws
 from nonsmooth.results.provenance import ATTRIBUTE, attribute, package_version, read_provenance, with_short_record
 from nonsmooth.results.representation import cut, html_table, text_table
+from nonsmooth.system.kinds import ends
 
 _COLUMNS = ("value", "uncertainty", "half_width", "logarithmic")
+_ROUNDS = 100  # in which draws within bounds are looked for
 
 
 class ParameterSet(Answering, Mapping[str, float]):
@@ -39,13 +41,26 @@ class ParameterSet(Answering, Mapping[str, float]):
         be wrong by more than its uncertainty.
     synthetic : bool
         Whether it was identified from computed recordings.
+    bounds : mapping of str to (low, high)
+        Within which parameters were searched, and are drawn; None: none.
     """
 
-    __slots__ = ("_covariance", "anomalies", "estimates", "extra", "findings", "identifiability", "notes", "synthetic")
+    __slots__ = (
+        "_covariance",
+        "anomalies",
+        "bounds",
+        "estimates",
+        "extra",
+        "findings",
+        "identifiability",
+        "notes",
+        "synthetic",
+    )
     estimates: Mapping[str, Estimate]
     extra: Mapping[str, Estimate]
     findings: tuple[Finding, ...]
     identifiability: Mapping[str, str]
+    bounds: Mapping[str, tuple[float | None, float | None]]
     notes: tuple[str, ...]
     anomalies: tuple[str, ...]
     synthetic: bool
@@ -62,6 +77,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         notes: Sequence[str] = (),
         anomalies: Sequence[str] = (),
         synthetic: bool = False,
+        bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
     ) -> None:
         for name, one in {**estimates, **(extra or {})}.items():
             if not isinstance(one, Estimate):
@@ -72,7 +88,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         if matrix.shape != (n, n):
             raise ValueError(f"covariance must be ({n}, {n}): parameters, then extra; got {matrix.shape}")
         matrix.flags.writeable = False
-        mappings = {"estimates": estimates, "extra": extra, "identifiability": identifiability}
+        mappings = {"estimates": estimates, "extra": extra, "identifiability": identifiability, "bounds": bounds}
         held = {
             **{name: MappingProxyType(dict(given or {})) for name, given in mappings.items()},
             "findings": tuple(findings),
@@ -92,7 +108,7 @@ class ParameterSet(Answering, Mapping[str, float]):
     def _beside(self) -> dict[str, Any]:
         """Findings and sentences that go with the numbers, as arguments."""
         held = {name: getattr(self, name) for name in ("findings", "notes", "anomalies", "synthetic")}
-        return held | {"identifiability": dict(self.identifiability)}
+        return held | {"identifiability": dict(self.identifiability), "bounds": dict(self.bounds)}
 
     @property
     def _rows(self) -> dict[str, Estimate]:
@@ -207,17 +223,35 @@ class ParameterSet(Answering, Mapping[str, float]):
         return ParameterSet(kept, matrix, extra=extra, **self._beside() | {"notes": notes})
 
     def draw(self, n: int, seed: int = 0) -> dict[str, FloatArray]:
-        """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal.
+        """``n`` sets of the model's parameters, correlated as known, within their bounds; those known to a factor are
+        log-normal.
 
         They are rows of the posterior where the set has one.
+
+        Raises
+        ------
+        ValueError
+            If next to none lies within the bounds, or the uncertainty of a parameter is infinite.
         """
-        names = list(self.estimates)
+        names, rng = list(self.estimates), np.random.default_rng(seed)
         if "posterior" in self._data:
             table = self.posterior.sel(parameter=names).values
-            values = table[np.random.default_rng(seed).integers(len(table), size=n)]
+            values = table[rng.integers(len(table), size=n)]
         else:
             logarithmic = [self.estimates[name].logarithmic and self[name] > 0 for name in names]
-            values = normal_draws([*self.values()], self.covariance.values, n, seed, logarithmic)
+            low, high = np.array([ends(self.bounds.get(name, (None, None)), name) for name in names]).reshape(-1, 2).T
+            values = np.empty((0, len(names)))
+            for _ in range(_ROUNDS):
+                rows = normal_draws([*self.values()], self.covariance.values, n, rng, logarithmic)
+                inside = ((rows >= low) & (rows <= high)).all(axis=1)
+                values = np.concatenate([values, rows[inside]])[:n]
+                if len(values) == n:
+                    break
+            else:
+                raise ValueError(
+                    f"of {_ROUNDS * n} draws only {len(values)} lie within the bounds of the parameters, of which an "
+                    "uncertainty is many times as wide: take others, found.only([...]), or fit(..., posterior=)"
+                )
         return {name: values[:, i].copy() for i, name in enumerate(names)}
 
     def to_dataset(self) -> xr.Dataset:
@@ -232,6 +266,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             "anomalies": list(self.anomalies),
             "n_parameters": len(self.estimates),
             "identifiability": dict(self.identifiability),
+            "bounds": {name: list(pair) for name, pair in self.bounds.items()},
             "units": [row.unit for row in rows.values()],
             "findings": [finding.to_record() for finding in self.findings],
         }
@@ -268,6 +303,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             identifiability=record["identifiability"],
             notes=record["notes"],
             anomalies=record.get("anomalies", ()),
+            bounds={name: tuple(pair) for name, pair in record.get("bounds", {}).items()},
             synthetic=record["synthetic"],
         )
 

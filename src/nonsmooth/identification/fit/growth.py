@@ -319,7 +319,11 @@ def with_steady(problem: Windows, theta: FloatArray, grown: Grown | None = None)
     if grown is not None:
         now, starts = replace(grown.problem, steady=problem.steady), grown.starts
     final = _final(level(Stage(now, theta, starts)), problem.noise, _ROUNDS)
-    return final if grown is None else replace(final, stuck=grown.stuck, begins=grown.begins, doubted=grown.doubted)
+    return (
+        final
+        if grown is None
+        else replace(final, stuck=grown.stuck, opened=grown.opened, begins=grown.begins, doubted=grown.doubted)
+    )
 
 
 def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
