@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import zlib
+from pathlib import Path
 
 import pytest
 
@@ -143,3 +144,27 @@ def test_wrong_columns_at_the_door() -> None:
         load_recording("absent.csv", columns=["t"])
     with pytest.raises(TypeError, match=r"columns\['x'\] must be a header"):
         load_recording("absent.csv", columns={"x": 1.5})
+
+
+@pytest.mark.parametrize(
+    ("mark", "other", "cut"), [(".", ",", ";"), (",", ".", "\t"), (".", ",", ","), (" ", ",", ";"), (" ", ".", ",")]
+)
+@pytest.mark.parametrize("whole", [True, False])
+def test_the_mark_between_thousands_is_no_decimal_mark(
+    tmp_path: Path, mark: str, other: str, cut: str, whole: bool
+) -> None:
+    """Of whole numbers nothing else tells the decimal mark: 1.234 of a German program is a thousand."""
+    file = tmp_path / "log.csv"
+    part = "" if whole else f"{other}5"
+    lines = [f'"t"{cut}"x"', *(f'"{k}"{cut}"{k}{mark}234{part}"' for k in range(1, 40))]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = load_recording(file, thousands=mark, delimiter=cut).channel("x")
+    assert found.values.tolist() == [1000.0 * k + 234 + 0.5 * (not whole) for k in range(1, 40)]
+
+
+def test_labels_with_digits(tmp_path: Path) -> None:
+    file = tmp_path / "serial.txt"
+    file.write_text("".join(f"a0:{k},a1: {-k}.5\n" for k in range(40)), encoding="utf-8")
+    recording = load_recording(file, rate=10.0)
+    assert recording.channels == ("a0", "a1")
+    assert recording.channel("a1").values.tolist() == [float(f"{-k}.5") for k in range(40)]

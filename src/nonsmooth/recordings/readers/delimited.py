@@ -111,7 +111,7 @@ def _header(
     if len(top) > 1 and all(match and (not match[2] or numerals.some(match[2])) for match in labelled):
         names = [match[1] for match in labelled if match]
         whole = itertools.chain([(line, top)], table)
-        return names, ((at, [re.sub(r"^[^\d]*[:=]", "", text) for text in fields]) for at, fields in whole)
+        return names, ((at, [re.sub(r"^[^:=]*[:=]", "", text) for text in fields]) for at, fields in whole)
     plain = all(text == "" or _STAMP.fullmatch(text) or numerals.some(text) for text in top)
     if reading.header or not plain or not any(map(numerals.some, top)):
         return top, table

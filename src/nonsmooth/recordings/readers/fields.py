@@ -42,6 +42,9 @@ class FieldTable(NamedTuple):
     rate: float | None = None
 
 
+Runs = list[tuple[str, BoolArray | None]]  # each with the mask of its rows; None: all
+
+
 def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
     """``"Force (push) (N/(m/s))"`` -> ``("Force (push)", "N/(m/s)")``: the last balanced bracket is the unit."""
     stripped, depth = text.strip(), 0
@@ -103,10 +106,11 @@ def _find(wanted: str | int, header: Sequence[str], named: list[tuple[str, str]]
 
 def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
     """The channels of a table by run, over its axis or at its rate."""
-    fields = [_unwrapped(one, reading) for one in table.fields]
+    numbers = next((one for one in table.fields if one.name == "run" and "run" in (reading.columns or {})), None)
+    runs = _runs(table, numbers, reading)
+    fields = [_unwrapped(one, runs, reading) for one in table.fields if one is not numbers]
     axis, rate = next((one for one in fields if one.name == reading.axis), None), reading.rate or table.rate
-    numbers = next((one for one in fields if one.name == "run" and "run" in (reading.columns or {})), None)
-    fields = [one for one in fields if one is not axis and one is not numbers]
+    fields = [one for one in fields if one is not axis]
     if axis is not None and reading.rate is not None:
         reading.say(f"{axis.origin} is not used as the time, since rate= is given")
         axis = None
@@ -114,8 +118,7 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
     if axis is not None:
         held = slice(None) if axis.rows is None else axis.rows
         known[held] = True
-        clock[held], unit = _along(axis, table, reading)
-    runs = _runs(table, numbers, reading)
+        clock[held], unit = _along(axis, table, runs, reading)
     reading.few(len(runs) * (len(fields) + 1), f"columns, {len(fields) + 1} in each of {len(runs)} runs")
     for one in fields:
         rows = np.arange(table.rows) if one.rows is None else one.rows
@@ -130,8 +133,8 @@ def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
             if not known[at].all():
                 complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {reading.axis}"
                 raise reading.error(row_of(at[~known[at]][0], table.lines), complaint)
-            first = 0 if inside is None else np.flatnonzero(inside)[0]
-            taken = (at - first) / (rate or 1.0) if axis is None else clock if len(at) == table.rows else clock[at]
+            order = at if inside is None else np.cumsum(inside)[at] - 1
+            taken = order / (rate or 1.0) if axis is None else clock if len(at) == table.rows else clock[at]
             lines = None if table.lines is None else table.lines[at]
             yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
 
@@ -141,18 +144,20 @@ def row_of(row: int, lines: IntArray | None) -> str:
     return f"row {row + 1}" if lines is None else f"line {lines[row]}"
 
 
-def _unwrapped(field: Field, reading: Reading) -> Field:
-    """The field, with a counter that begins anew at its period put together."""
+def _unwrapped(field: Field, runs: Runs, reading: Reading) -> Field:
+    """The field, with a counter that begins anew at its period put together in each run."""
     period = (reading.wraps or {}).get(field.name)
     if period is None or field.values.dtype.kind not in "iuf":
         return field
     values = np.array(field.values, float)
-    good = np.isfinite(values)
-    values[good] = np.unwrap(values[good], period=period)
+    rows: Any = slice(None) if field.rows is None else field.rows
+    for _, inside in runs:
+        good = np.isfinite(values) & (inside is None or inside[rows])
+        values[good] = np.unwrap(values[good], period=period)
     return replace(field, values=values)
 
 
-def _along(axis: Field, table: FieldTable, reading: Reading) -> tuple[FloatArray, str]:
+def _along(axis: Field, table: FieldTable, runs: Runs, reading: Reading) -> tuple[FloatArray, str]:
     """The axis and its unit: times in seconds."""
     axis = replace(axis, unit=(reading.units or {}).get(reading.axis, axis.unit))
     if reading.axis != "time":
@@ -161,7 +166,7 @@ def _along(axis: Field, table: FieldTable, reading: Reading) -> tuple[FloatArray
         seconds, begun = seconds_of(axis, table.lines, reading)
         if begun:
             reading.run_attrs.setdefault(table.run, {})["started"] = begun
-        return _unwrapped(replace(axis, values=seconds), reading).values, "s"
+        return _unwrapped(replace(axis, values=seconds), runs, reading).values, "s"
     values, scale = np.asarray(axis.values, float), TIME_SCALES.get(axis.unit.partition(" since ")[0].strip())
     if scale is None:
         raise reading.error(
@@ -175,7 +180,7 @@ def _along(axis: Field, table: FieldTable, reading: Reading) -> tuple[FloatArray
     return values * scale, "s"
 
 
-def _runs(table: FieldTable, numbers: Field | None, reading: Reading) -> list[tuple[str, BoolArray | None]]:
+def _runs(table: FieldTable, numbers: Field | None, reading: Reading) -> Runs:
     """The runs, each with the mask of its rows; one run where no column numbers them."""
     if numbers is None:
         return [(table.run, None)]

@@ -106,8 +106,9 @@ class Numerals(NamedTuple):
 
     @classmethod
     def of(cls, delimiter: str, reading: Reading) -> Numerals:
-        """As they are asked for; a comma that separates fields is no decimal mark."""
-        return cls(reading.decimal or ("." if delimiter == "," else None), reading.thousands, reading.na or ())
+        """As they are asked for; a mark that separates fields or thousands is no decimal mark."""
+        taken = delimiter if reading.thousands not in (".", ",") else reading.thousands
+        return cls(reading.decimal or {",": ".", ".": ","}.get(taken), reading.thousands, reading.na or ())
 
     def some(self, field: str) -> bool:
         """Return whether it is a number, or the mark of a missing one."""
@@ -143,7 +144,7 @@ def read_cells(
     decimal, thousands, na = numerals.decimal, numerals.thousands, {*numerals.na}
     if decimal is None:  # a comma, if there are fields that are numbers with one and none that are with a point
         fields = [row[k] for _, row in head for k in wanted if k < len(row)]
-        commas, points = (any(mark in f and number(f, mark) is not None for f in fields) for mark in ",.")
+        commas, points = (any(mark in f and number(f, mark, thousands) is not None for f in fields) for mark in ",.")
         decimal = "," if commas and not points else "."
     begins = next((row[stamped] for _, row in head if len(row) > stamped >= 0 and row[stamped].strip()), "0")
     stamps: list[str] | None = None if number(begins, decimal, thousands) is not None else []
