@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from tests.identification.driven_mass import driven
 from tests.identification.fit_cases import cell
 
@@ -104,3 +105,40 @@ def test_a_speed_with_impacts_under_a_measured_force(off: float) -> None:
     assert abs(found["e"] - 0.7) < 3 * found.uncertainty["e"] < 0.004
     assert abs(found["k"] - 4.0) < 3 * found.uncertainty["k"] < 0.01
     assert not found.anomalies, found.anomalies
+
+
+def test_windows_find_what_was_written_before_them() -> None:
+    """A force that follows the speed of the last rise through 0: from rise to rise all is the same, but for a factor.
+
+    The guess writes other speeds than the record, and over short windows these are no longer those of its motion."""
+    k, c, a, first = 9.0, 0.04, 2.0, 0.3
+    w = np.sqrt(k - c * c / 4)
+
+    def swing(t: np.ndarray, at: float) -> tuple[np.ndarray, np.ndarray]:
+        """Place and speed from 0 with speed 1, about a place."""
+        fade, of_sine = np.exp(-c / 2 * t), (1.0 - c / 2 * at) / w
+        x = fade * (of_sine * np.sin(w * t) - at * np.cos(w * t))
+        return at + x, -c / 2 * x + fade * w * (of_sine * np.cos(w * t) + at * np.sin(w * t))
+
+    span = brentq(lambda t: swing(t, a / k)[0], 1.6, 2.4)
+    t = np.arange(0.0, 24.0, 0.02)
+    rises = np.floor((t - first) / span)
+    x = swing(t - first - rises * span, a / k)[0] * swing(span, a / k)[1] ** rises
+    x[t < first] = swing(t[t < first] - first, 0.0)[0]
+    system = ns.System(
+        states=["x", "v"],
+        parameters={"k": 9.5, "c": 0.06, "a": 1.2},
+        memory=["m"],
+        modes=dict.fromkeys(("below", "above"), lambda t, u, p: (u.v, p.a * p.m - p.k * u.x - p.c * u.v)),
+        indicators={"side": lambda t, u, p: u.x},
+        transitions=[
+            ns.Transition("below", "above", when="side > 0", write={"m": lambda t, u, p: u.v}),
+            ns.Transition("above", "below", when="side < 0"),
+        ],
+    )
+    read = {"x": (t, x + 1e-3 * np.random.default_rng(0).standard_normal(len(t)))}
+    for window in (5.0, None):
+        found = ns.fit(system, read, ["k", "c", "a"], window=window, mode="below", tries=1, progress=False)
+        for name, value in (("k", k), ("c", c), ("a", a)):
+            assert abs(found[name] - value) < 4 * found.uncertainty[name], name
+        assert not found.anomalies

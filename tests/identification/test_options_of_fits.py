@@ -99,3 +99,22 @@ def test_two_samples_of_one_instant_are_refused() -> None:
     t = np.repeat(T[::2], 2)
     with pytest.raises(ValueError, match="the time must increase from sample to sample; sample 1 is at 0 after 0"):
         ns.fit(swing(), {"time": t, "x": decay(4.0, t)}, ["k"], measured="x", **QUIET)
+
+
+def test_a_phase_is_not_known_from_another_record() -> None:
+    """Of two records one after the other, k is known from both, and the phase of each is its own."""
+    system = ns.System(
+        states={"x": "m", "v": "m/s"},
+        parameters={"k": 5.2, "c": 0.3},
+        modes={"one": lambda t, u, p: (u.v, np.cos(2.0 * t) - p.k * u.x - p.c * u.v)},
+    )
+    found, alone = None, []
+    for phase in (0.2, 0.7):
+        x = (np.exp(2j * T + 2j * np.pi * phase) / (5.0 - 4.0 + 0.6j)).real + decay(5.0, T, 0.3)
+        record = {"x": (T, x + NOISE[len(alone)])}
+        alone.append(ns.fit(system, record, ["k", "c", "phase"], **QUIET).uncertainty["k"])
+        found = ns.fit(system, record, ["k", "c", "phase"], priors=found, **QUIET)
+        told = found.estimate("phase")
+        assert abs(told.value - phase) < 4 * told.uncertainty < 0.01
+        assert abs(found["k"] - 5.0) < 4 * found.uncertainty["k"] and not found.anomalies
+    assert found is not None and found.uncertainty["k"] < 0.95 * min(alone)

@@ -182,3 +182,17 @@ def test_what_does_not_fit_is_refused(change: dict[str, Any], error: type[Except
     }
     with pytest.raises(error, match=message):
         ns.plan_experiment(oscillator(), given.pop("runs"), given.pop("parameters"), **given)
+
+
+def test_what_is_known_of_a_phase_counts() -> None:
+    """A phase that is known to next to nothing is as one that is known."""
+    s = ns.mechanical(M, C, "k", coordinates=["q"], parameters={"k": K}, forcing={"q": lambda t, p: np.cos(2.0 * t)})
+    run = {"one": {"duration": 6.0, "samples": 300}}
+    asked = {"measured": {"q": ns.Sensor(noise=NOISE)}, "free_start": False}
+    size = {
+        names: float(ns.plan_experiment(s, run, names, priors=priors, **asked)["uncertainty"].sel(parameter="k")[0])
+        for names, priors in ((("k",), None), (("k", "phase"), {"phase": (0.0, 1e-7)}))
+    }
+    assert size["k", "phase"] == pytest.approx(size["k",], rel=1e-6)
+    unknown = ns.plan_experiment(s, run, ["k", "phase"], **asked)["uncertainty"].sel(parameter="k")
+    assert float(unknown[0]) > 1.02 * size["k",]

@@ -18,7 +18,7 @@ class Prior(TypedDict, total=False):
     free_start : bool
         False: the motion begins exactly at ``start``.
     priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
-        What is known before of the unknowns.
+        What is known before of the unknowns; a set tells of those that all runs share.
     """
 
     free_start: Annotated[bool, Default(True)]

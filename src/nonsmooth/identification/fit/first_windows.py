@@ -61,7 +61,7 @@ def first_windows(
         z = np.concatenate([np.zeros(n_u) if start is None else start[i], memory])
         if here.values is None:
             continue
-        sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
+        sizes = np.abs(np.append(np.max(np.abs(np.nan_to_num(told)), axis=0), memory))
         time, mode, first, windows = record.time, problem.modes[i][0], 0, []
         while first < len(time) - 1:
             rest = time[-1] - time[first]
@@ -78,9 +78,10 @@ def first_windows(
             if motion is None:  # the samples of this window come back when windows are joined
                 first, mode = max(end - 1, first + 1), problem.modes[i][0]
                 continue
-            sizes = np.maximum(sizes, np.abs(motion.z[:, :n_u]).max(axis=0))
+            sizes = np.maximum(sizes, np.abs(motion.z).max(axis=0))
             last = end if end == len(time) else first + _quiet(motion.time, motion.log.crossing_time, length)
-            spread = np.zeros(len(z)) if first == 0 and not free else np.append(np.ones(n_u), np.zeros(len(memory)))
+            spread = np.zeros(len(z)) if first == 0 and not free else np.ones(len(z))
+            spread[n_u:] = first > 0  # what was written before the record is known
             if np.isfinite(record.values[first:last]).any():  # a gap is bridged where windows are joined
                 t, y = time[first:last], record.values[first:last]
                 windows.append(Window(i, first, last, begin, candidate, spread, mode, u.places[i], t, y))
@@ -88,7 +89,7 @@ def first_windows(
                 break
             z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])
             first = last
-        wide = WIDE * np.append(np.where(sizes > 0, sizes, problem.system.scale_vector()), np.ones(len(memory)))
+        wide = WIDE * np.where(sizes > 0, sizes, np.append(problem.system.scale_vector(), np.ones(len(memory))))
         wide[problem.system._description.n_own : n_u] = 0.0  # inputs are known
         found += [replace(window, spread=window.spread * wide) for window in windows]
     return found

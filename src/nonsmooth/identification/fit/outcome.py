@@ -138,7 +138,8 @@ def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]]
     open: NaN where it is the spread that holds a start, rather than readings."""
     from scipy.linalg import block_diag
 
-    problem, states = grown.problem, list(grown.problem.system.states.items())
+    problem, system = grown.problem, grown.problem.system
+    states = [*system.states.items(), *system.memory.items()]
     starts: dict[str, tuple[float, str]] = {}
     rows, own = list[FloatArray](), [np.zeros((0, 0))]
     for i, window in enumerate(problem.pieces):

@@ -186,13 +186,13 @@ def _information(
     state = whole.residuals(theta, whole.starts, True)
     normal = reduced(whole, state, whole.weights(None, starts=False))[0]
     shared = len(theta) - problem.unknowns.phases
-    own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
+    names, known = list(problem.unknowns.names[:shared]), problem.unknowns.precision
+    own = np.linalg.pinv((normal + known)[shared:, shared:], hermitian=True)
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]
-    names, known = list(problem.unknowns.names[:shared]), problem.unknowns.precision[:shared, :shared]
     for i in (names.index(name) for name in settings if name in names):  # known in this run, which tells nothing of it
         eliminated[i] = eliminated[:, i] = 0.0
         theta[i] = system.values[names[i]]
-    return names, eliminated, known, theta[:shared]
+    return names, eliminated, known[:shared, :shared], theta[:shared]
 
 
 def _uncertainties(information: FloatArray) -> FloatArray:

@@ -265,7 +265,8 @@ def read_unknowns(
     of_sensors = tuple((q, what) for name in given if "." in name for q, what in [name.split(".", 1)])
     check_keys(per_run, given, "per_run", "an unknown", "this fit")
     phases = (len(runs) - steady) * phase
-    each = {*per_run, *["phase"] * phase} if len(runs) > 1 else set()
+    own = {*per_run, *["phase"] * phase}
+    each = own if len(runs) > 1 else set()
     local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * phase]
     rows = [
         (n, run) for n in local for run in (runs[: phases if phase and n == "phase" else None] if n in each else [""])
@@ -289,7 +290,9 @@ def read_unknowns(
                     f"the first guess {name} = {guess[i]:g} lies outside its bounds {low[i]:g} ... {high[i]:g}; set "
                     f"another with system.with_parameters({name}=...)"
                 )
-    centre, precision = _known(names, priors, guess)
+    centre, precision = _known(
+        names, priors, guess, [name for name, n in zip(names, base, strict=True) if n not in own]
+    )
     return Unknowns(
         tuple(names),
         active,
@@ -306,15 +309,16 @@ def read_unknowns(
     )
 
 
-def _known(names: list[str], priors: Any, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Centre and precision of what is known before: ``{name: (value, standard uncertainty)}``, or a ParameterSet."""
+def _known(names: list[str], priors: Any, guess: FloatArray, shared: list[str]) -> tuple[FloatArray, FloatArray]:
+    """Centre and precision of what is known before: ``{name: (value, standard uncertainty)}``, or a ParameterSet, which
+    tells nothing of what each run has for its own."""
     p = len(names)
     centre, precision = guess.copy(), np.zeros((p, p))
     if priors is None:
         return centre, precision
     if hasattr(priors, "full_covariance"):
         covariance = priors.full_covariance
-        held = [name for name in names if name in covariance["parameter"].values]
+        held = [name for name in shared if name in covariance["parameter"].values]
         places = [names.index(name) for name in held]
         part = covariance.sel(parameter=held, other=held).values
         centre[places] = [priors.estimate(name).value for name in held]
