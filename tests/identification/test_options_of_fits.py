@@ -118,3 +118,12 @@ def test_a_phase_is_not_known_from_another_record() -> None:
         assert abs(told.value - phase) < 4 * told.uncertainty < 0.01
         assert abs(found["k"] - 5.0) < 4 * found.uncertainty["k"] and not found.anomalies
     assert found is not None and found.uncertainty["k"] < 0.95 * min(alone)
+
+
+def test_an_offset_is_in_the_unit_of_its_channel() -> None:
+    """Of a channel in mm, which names no unit, it is in none; beside a gain of 1 in that of the place."""
+    for gain, unit in ((1e3, ""), (1.0, "m")):
+        record = {"time": T, "x": gain * (decay(4.0, T) + NOISE[0]) + 7.0}
+        found = ns.fit(swing(), record, ["k", "x.offset"], measured={"x": ns.Sensor(gain=gain)}, **QUIET)
+        assert found.estimate("x.offset").value == pytest.approx(7.0, abs=gain * 1e-3)
+        assert found.estimate("x.offset").unit == unit

@@ -400,3 +400,18 @@ def test_draws_of_a_fit_stay_within_its_bounds(tmp_path: Any) -> None:
     np.testing.assert_array_equal(found.draw(30)["k"], kept.draw(30)["k"])
     band = ns.propagate(found, ns.simulate, s, duration=2.0, samples=3, start={"q": 1.0}, draws=40, **QUIET)
     assert band["drawn_c"].min() >= 0.0
+
+
+def test_what_a_fit_found_of_each_run_is_asked_for() -> None:
+    """Two swings of other dampings: neither is that of the system, nor its first guess."""
+    t, rng = np.arange(0.0, 12.0, 0.05), np.random.default_rng(1)
+    s = ns.mechanical(1.0, "c", "k", coordinates=["q"], parameters={"c": 0.2, "k": 8.8})
+    swings = [np.exp(-c / 2 * t) * np.cos(np.sqrt(9.0 - c * c / 4) * t) for c in (0.1, 0.3)]
+    runs = [{"q": (t, x + 1e-3 * rng.standard_normal(t.size))} for x in swings]
+    found = ns.fit(s, runs, ["c", "k"], per_run=["c"], tries=1, **QUIET)
+    asked: dict[str, Any] = {"duration": 2.0, "samples": 3, "start": {"q": 1.0}, "draws": 4, **QUIET}
+    with pytest.raises(ValueError, match="'c, 0' was found of run 0 alone: say which value holds here, settings="):
+        ns.propagate(found, ns.simulate, s, **asked)
+    told = found.estimate("c, 1")
+    band = ns.propagate(found, ns.simulate, s, settings={"c": (told.value, told.uncertainty)}, **asked)
+    assert band["drawn_c"].mean() == pytest.approx(0.3, abs=5e-3)

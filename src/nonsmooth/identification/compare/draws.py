@@ -72,6 +72,12 @@ def nominal(system: System, parameters: Mapping[str, float] | None, settings: Se
     for name, value in given.items():
         if isinstance(value, tuple | list):
             raise TypeError(f"{name!r} is given as {value!r}: with an uncertainty it stands in settings=")
+    for key in getattr(parameters, "extra", {}):
+        name, comma, run = key.partition(", ")
+        if comma and name in system.values and name not in settings:
+            raise ValueError(
+                f"{key!r} was found of run {run} alone: say which value holds here, settings={{{name!r}: ...}}"
+            )
     system = system.with_parameters(given)
     return system.with_parameters(settled(settings, system.values))
 

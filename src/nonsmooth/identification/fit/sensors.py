@@ -244,8 +244,9 @@ def read_unknowns(
     known |= {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
     for q, unit in {**system.states, **system.outputs}.items():
         if q in sensors:
-            inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
-            for what, of in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
+            same = sensors[q].gain == 1  # of the channel and the quantity
+            inverse = f"1/({unit})" if unit and not same else ""
+            for what, of in zip(OF_A_SENSOR, (inverse, unit * same, ""), strict=True):  # gain, offset, delay
                 known[f"{q}.{what}"] = (getattr(sensors[q], what), of)
     allowed = {name: unit for name, (_, unit) in known.items()}
     if not given and parameters is not None:  # None: all is known
