@@ -142,3 +142,27 @@ def test_windows_find_what_was_written_before_them() -> None:
         for name, value in (("k", k), ("c", c), ("a", a)):
             assert abs(found[name] - value) < 4 * found.uncertainty[name], name
         assert not found.anomalies
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_speed_that_turns_where_its_sensor_ends(seed: int) -> None:
+    """A ball dropped on a table, its speed read up to 1.5 m/s: at the limit a reading is beside 1.5 or beyond, and so
+    before the impact, however much nearer the limit is to the speed behind it."""
+    g, e = 9.81, 0.5
+    t, falls = np.arange(0.0, 1.05, 0.03), np.sqrt(4.0 / g)
+    spans = falls * np.append(1.0, 2 * e ** np.arange(1.0, 4.0))
+    begins = np.cumsum(np.append(0.0, spans))
+    k = np.searchsorted(begins, t, "right") - 1
+    speed = g * (t - begins[k]) - np.where(k > 0, g * falls * e**k, 0.0)
+    read = np.minimum(speed + 0.01 * np.random.default_rng(seed).standard_normal(len(t)), 1.5)
+    ball = ns.System(
+        states=["x", "v"],
+        parameters={"e": 0.45},
+        modes={"fly": lambda t, u, p: (u.v, g)},
+        indicators={"hit": lambda t, u, p: u.x},
+        transitions=[ns.Transition("fly", "fly", when="hit > 0", reset=lambda t, u, p: (0.0, -p.e * u.v))],
+    )
+    sensor = {"v": ns.Sensor(noise=0.01, range=(-np.inf, 1.5))}
+    known = {"start": {"x": -2.0, "v": 0.0}, "free_start": False}
+    found = ns.fit(ball, {"v": (t, read)}, ["e"], measured=sensor, **known, tries=1, progress=False)
+    assert abs(found["e"] - e) < 4 * found.uncertainty["e"] < 4e-3 and not found.anomalies

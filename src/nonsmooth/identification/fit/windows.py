@@ -188,6 +188,7 @@ class Windows:
         def misfit(one: SampledRun) -> FloatArray:
             """Sum of the squared residuals of each sample, over the noise."""
             left = window.values[window.readings] - self.readings(theta, window, one, False)[0]
+            left, _ = self._censored(window, left, left[:0])
             squares = (left / self.noise[window.readings[1]]) ** 2
             return np.bincount(self.samples_of(theta, window), squares, len(one.time)).astype(float)
 
