@@ -301,7 +301,8 @@ def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, l
             a = 0 if first == 0 else now.pieces[mine[first]].first
             b = len(record.time) if behind == len(mine) else now.pieces[mine[behind - 1]].last
             name = record.name if b - a == len(record.time) else f"{record.name} from {record.time[a]:.6g}"
-            records.append(replace(record, name=name, time=record.time[a:b], values=record.values[a:b]))
+            time, values = record.time[a:b], record.values[a:b]
+            records.append(replace(record, name=name, time=time, values=values, first=a == 0))
             origin.append(i)
             modes.append(problem.modes[i] if a == 0 else tuple(range(len(problem.system.modes))))
     u = problem.unknowns

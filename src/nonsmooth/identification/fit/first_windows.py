@@ -81,7 +81,7 @@ def first_windows(
             sizes = np.maximum(sizes, np.abs(motion.z).max(axis=0))
             last = end if end == len(time) else first + _quiet(motion.time, motion.log.crossing_time, length)
             spread = np.zeros(len(z)) if first == 0 and not free else np.ones(len(z))
-            spread[n_u:] = first > 0  # what was written before the record is known
+            spread[n_u:] = first > 0 or not record.first  # what was written before the run is known
             if np.isfinite(record.values[first:last]).any():  # a gap is bridged where windows are joined
                 t, y = time[first:last], record.values[first:last]
                 windows.append(Window(i, first, last, begin, candidate, spread, mode, u.places[i], t, y))

@@ -39,6 +39,8 @@ class Record:
     settings : mapping of str to float
     drive : Driven or None
         The inputs of the system in this run.
+    first : bool
+        Whether it is no later part of a run, before which the system may have written what nobody knows.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Record:
     values: FloatArray
     settings: Mapping[str, float]
     drive: Driven | None = None
+    first: bool = True
 
     @property
     def duration(self) -> float:
