@@ -139,3 +139,8 @@ def test_jumps_are_those_of_every_state_and_output_and_a_plot_draws_its_own() ->
         texts = [float(one.get_text()) for one in ns.plot.frequency_response(response, y=name).texts if one.get_text()]
         assert len(texts) == (names == name).sum() and np.min(np.abs(np.array(texts) - others)) > 0.02
     assert not [one for one in ns.plot.frequency_response(response, y="x").texts if one.get_text()]
+
+
+def test_amplitudes_are_those_of_extremes() -> None:
+    with pytest.raises(ValueError, match="leave extremes=False out"):
+        ns.frequency_response(ns.models.impact_oscillator(), [0.8, 0.9], judge=False, extremes=False)

@@ -57,6 +57,8 @@ def frequency_response(
     that a jump may stand for some of them only; between points whose ``period_number`` is 0 it may be the scatter of
     chaos.
     """
+    if not options["extremes"]:
+        raise ValueError("amplitudes are those of extremes: leave extremes=False out, or take sweep")
     if parameter is None:
         parameter = forcing_parameter(system)
     if parameter not in system.parameters:
