@@ -424,3 +424,26 @@ def test_a_kick_at_a_phase_comes_once_each_period(method: str) -> None:
     assert run["u_after"].values[:, 1] == pytest.approx(0.1 + kick * np.arange(1, 6), rel=1e-12)
     x = 0.1 * 5 * period + kick * sum(period * (5 - 0.25 - k) for k in range(5))
     assert run["u"].values[-1, 0] == pytest.approx(x, rel=1e-12)
+
+
+def test_one_state_beside_one_memory_is_not_planar() -> None:
+    """x' = a cos t - x + d: x = d + a (cos t + sin t) / 2 + (x(0) - d - a / 2) exp(-t); d is 0.5 beyond x = 2."""
+
+    def field(t, u, p):
+        return p.a * np.cos(t) - u.x + p.d
+
+    system = ns.System(
+        states=["x"],
+        parameters={"a": 0.4},
+        memory={"d": 0.3},
+        modes={"before": field, "behind": field},
+        indicators={"far": lambda t, u, p: u.x - 2.0},
+        transitions=[ns.Transition("before", "behind", when="far > 0", write={"d": lambda t, u, p: 0.5})],
+    )
+    run = ns.simulate(system, periods=2, start={"x": 1.4}, method="exact")
+    t = run["time"].values
+    wanted = 0.3 + 0.2 * (np.cos(t) + np.sin(t)) + (1.4 - 0.3 - 0.2) * np.exp(-t)
+    np.testing.assert_allclose(run["u"].values[:, 0], wanted, rtol=0, atol=1e-13)
+    for start, d in ((1.4, 0.3), (2.5, 0.5)):
+        found = ns.sweep(system, "a", [0.4, 0.6], start={"x": start}, keep=5, progress=False)
+        np.testing.assert_allclose(found["section"].values[:, :, 0], [[d + 0.2] * 5, [d + 0.3] * 5], rtol=0, atol=1e-12)

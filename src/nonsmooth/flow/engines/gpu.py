@@ -49,7 +49,8 @@ class PlanarOnGpu(OnGpu):
         self.cuda, self.threads, self.plan, self.phase = cuda, THREADS, plan, float(plan.phase)
         self.period: FloatArray = tables.period
         given = cuda.to_device(_packed(tables.form)), cuda.to_device(tables.form.multiples)
-        of_point = sum(part.size for part in scratch(self.n, harmonics, n_modes, *self.sizes, n_rows)[0])
+        room = scratch(self.n, harmonics, n_modes, *self.sizes, n_rows, planar=harmonics == 1)[0]
+        of_point = sum(part.size for part in room)
         self.tables = *given, cuda.device_array((of_point, len(points)))
         self.launch(self.module.tabulate, np.arange(len(points)), self.tables)
         self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)

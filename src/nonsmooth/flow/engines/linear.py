@@ -91,7 +91,7 @@ class LinearEngine(Engine):
         local = self._threads
         if not hasattr(local, "work"):
             n, harmonics = tables.form.A.shape[-1], len(tables.form.multiples)
-            local.work, local.last = scratch(n, harmonics, *tables.sizes), tables
+            local.work, local.last = scratch(n, harmonics, *tables.sizes, planar=self.is_planar), tables
         if local.last is not tables:  # the same place among other points
             local.work[1].built[0], local.last = 0, tables
         return tables.form, *local.work
@@ -118,13 +118,21 @@ LANES = 4  # numbers of a vector: columns of propagators are filled up to whole 
 
 
 def scratch(
-    states: int, harmonics: int, n_modes: int, n_indicators: int, n_outputs: int, n_rows: int, *, apart: bool = False
+    states: int,
+    harmonics: int,
+    n_modes: int,
+    n_indicators: int,
+    n_outputs: int,
+    n_rows: int,
+    *,
+    planar: bool = False,
+    apart: bool = False,
 ) -> tuple[Tables, Work]:
     """Tables and working memory for one thread, in one block.
 
-    ``apart``: each table by itself, which takes memory only where it is written."""
+    ``planar``: for the kernel of two states with one harmonic. ``apart``: each table by itself, which takes memory only
+    where it is written."""
     n, m, n_f = states, states + 1 + 2 * harmonics, n_indicators + states + n_outputs
-    planar = states == 2 and harmonics == 1 and not apart  # modes that are made on the way have the other module's
     filled = n if planar else -(-n // LANES) * LANES
 
     def whole(*shape: int) -> Any:
