@@ -14,7 +14,7 @@ import numpy as np
 
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.flow.engines.devices import StatesOnGpu, batch_size, batches
-from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.gpu import PART, SLICE, PlanarOnGpu, SeriesOnGpu
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import Engine
@@ -237,7 +237,7 @@ def settle_on_gpu(
 def sweep_on_gpu(
     settler: Settler,
     points: FloatArray,
-    start: FloatArray,
+    start: State,
     chain: Kept,
     advance: Callable[[int], Any],
 ) -> Settled:
@@ -245,11 +245,11 @@ def sweep_on_gpu(
     parts = []
     for some, own, rows in batches(points, np.arange(len(points)), _batch(settler.engine)):
         gpu = _on_gpu(settler.engine, own, settler.plan)
-        states = _states_at(gpu, np.tile(start, (len(rows), 1)), settler.system.memory_vector(), rows, 0, 0.0)
+        states = _states_at(gpu, np.tile(start.place, (len(rows), 1)), start.memory, rows, int(start.counters[0]), 0.0)
         rounds = JobsOnGpu(gpu, states, settler.rules(), extremes=False)
         rounds.run()
         _into(chain, some, rounds.kept, gpu)
-        parts.append(rounds.found(len(start)))
+        parts.append(rounds.found(settler.width))
         advance(len(rows))
     return Settled.joined(parts)
 

@@ -126,12 +126,12 @@ class Settler:
         rows : array (J,) of int
             The parameter point of each job.
         starts : array (J, n) or (J, width)
-            States, or places at which other runs ended (``last``).
+            States, or places at which other runs ended (``last``). One beyond a rigid stop is not run:
+            ``no_convergence``.
         carried : bool
             Job j goes on from where job j - 1 ended (from its own start where that failed).
         modes : array (J,) of int, optional
-            Mode at the start; that of the phase (:func:`.mode_at`) where not given. Then a start beyond a rigid stop is
-            not run: ``no_convergence``.
+            Mode at the start; that of the phase (:func:`.mode_at`) where not given.
         begin : float
             Phase of the forcing at the starts, in periods, where they do not say it themselves.
         attempts : int
@@ -140,15 +140,19 @@ class Settler:
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         points = np.ascontiguousarray(points, dtype=float)
-        if modes is None:
+        n = len(self.system.states)
+        if starts.shape[1] <= n + len(self.system.memory):  # it has no time of its own
             which = self.admissible(points[rows], starts, begin, carried)
             if len(which) < len(rows):
-                found = Settled.empty(len(rows), len(self.system.states), self.width)
+                found = Settled.empty(len(rows), n, self.width)
                 found.status[:] = codes.NO_CONVERGENCE
                 if len(which):
-                    some = self.run(points, rows[which], starts[which], carried=carried, begin=begin, attempts=attempts)
+                    own = None if modes is None else np.asarray(modes)[which]
+                    begun = points, rows[which], starts[which]
+                    some = self.run(*begun, carried=carried, modes=own, begin=begin, attempts=attempts)
                     found.put(which, some)
                 return found
+        if modes is None:
             one = varying_phases(self.system.traced) is None
             modes = np.array([mode_at(self.system, begin, values) for values in points[: 1 if one else None]])
             modes = np.full(len(rows), modes[0]) if one else modes[rows]
@@ -218,7 +222,7 @@ class Settler:
         if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
             none = np.zeros(0)
             return SectionTrace(np.zeros((0, n)), np.zeros(0, dtype=np.int64), none, place, mode)
-        end = np.concatenate([state.u, state.memory, state.clock[:1]])[: self.width]
+        end = np.append(state.place, state.clock[0])[: self.width]
         return SectionTrace(
             out.section[0], out.section_mode[0], out.section_time[0] - begin, end, int(state.counters[0])
         )

@@ -38,6 +38,7 @@ _WRITTEN: dict[str, dict[str, Any]] = {
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
 _STATE_BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 _STATE = {"anyOf": [_NUMBERS, _STATE_BY_NAME]}
+_START = {"anyOf": [_NUMBERS, _STATE_BY_NAME | {"properties": {"mode": {"type": "string"}}}]}
 
 
 def add(commands: Any) -> Any:
@@ -112,8 +113,8 @@ def study_schema() -> dict[str, Any]:
             },
             "start": {
                 "anyOf": [
-                    _STATE,
-                    {"type": "array", "items": _STATE},
+                    _START,
+                    {"type": "array", "items": _START},
                     _arguments(nonsmooth.random_starts, low=_STATE, high=_STATE),
                 ]
             },

@@ -21,7 +21,7 @@ from nonsmooth.flow.options import Solver, as_called, longest_period, solver_of
 from nonsmooth.flow.poincare import poincare
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.simulate import simulate
-from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.system.arguments import checked
@@ -152,13 +152,13 @@ def amplitude_spectrum(
 
 def _period_number(system: System, engine: Engine, section: Any, start: Any, transient: int) -> int:
     """The period number of the attractor that a start leads to, as a sweep finds it."""
-    plan, starts = section_plan(system, section)[1], start_states(system, start)
+    plan, state = section_plan(system, section)[1], first_state(system, start)
     points = system.parameter_vector()[None, :]
     if plan.indicator >= 0:
-        refuse_resting(system, starts, points, "amplitude_spectrum")
+        refuse_resting(system, [state], points, "amplitude_spectrum")
     settler = Settler(system, engine, plan, transient, KEPT, longest_period(KEPT, None), False)
-    found = settler.run(points, [0], starts)
-    warn_if_small(system, starts, found.maximum, found.minimum)
+    found = settler.run(points, [0], state.place[None], modes=[state.counters[0]])
+    warn_if_small(system, state.u, found.maximum, found.minimum)
     return int(found.period_number[0])
 
 

@@ -19,7 +19,7 @@ from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.loads import checked_loads
 from nonsmooth.flow.options import Campaign, as_called, kept_of, workers_of
-from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.flow.starts import first_states, is_one_start
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import at_least, swept_values
 
@@ -54,7 +54,8 @@ def chart(
     grid : mapping
         Two parameters and their values: ``{"omega": (A,), "rho": (B,)}``.
     start : state or list of states, optional
-        Every point begins there; zeros where not given. Several starts add the dim ``start`` and ``n_attractors``.
+        Every point begins there, as in :func:`nonsmooth.simulate`; zeros where not given. Several starts add the dim
+        ``start`` and ``n_attractors``.
     carry : mapping, optional
         ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point. On a
         GPU the rows run side by side, so it needs many of them.
@@ -129,7 +130,8 @@ def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> Plann
     asked, values = as_called(locals()), _grid(system, grid)
     edges = _edges(system, values)
     along = _carry(values, options["carry"])
-    starts = start_states(system, options["start"])
+    begun = first_states(system, options["start"])
+    starts = np.array([state.u for state in begun])
     lyapunov = options["lyapunov"]
     n_exponent = (EXPONENT_RETURNS if lyapunov else 0) if isinstance(lyapunov, bool) else lyapunov
     if 0 < n_exponent < 40:
@@ -145,17 +147,18 @@ def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> Plann
         extremes=extremes,
     )
     if settler.plan.indicator >= 0:
-        refuse_resting(system, starts, edges, "chart")
+        refuse_resting(system, begun, edges, "chart")
     measured = checked_loads(system, options["loads"], "chart")
     axes, order = _axes(values, along)
     work = ChartWork(
         settler,
         axes,
-        starts,
+        np.array([state.place for state in begun]),
         along is not None,
         n_exponent,
         tuple(measured),
         chunk=CHUNK if settler.device == "cpu" else BATCH,
+        modes=settler.told(np.array([state.counters[0] for state in begun])),
         described=inputs(system, "chart", asked | {"grid": values}),
     )
 

@@ -37,15 +37,18 @@ class ChartWork:
         Returns over which the exponent is measured; 0: not wanted.
     loads : tuple of str
         Names of the loads of elements, where they are wanted.
+    modes : array, optional
+        Modes at the starts (``Settler.told``); that of phase 0 where not given.
     """
 
     settler: Settler
     grid: Mapping[str, FloatArray]
-    starts: FloatArray  # (S, n)
+    starts: FloatArray  # (S, n + memory)
     carried: bool = False
     lyapunov: int = 0
     loads: tuple[str, ...] = ()
     where: IntArray | None = None
+    modes: Any = None
     chunk: int = CHUNK
     described: Mapping[str, Any] = field(default_factory=dict)
 
@@ -73,7 +76,7 @@ class ChartWork:
 
     def columns(self) -> dict[str, ColumnType]:
         many = () if len(self.starts) == 1 else (len(self.starts),)
-        n = self.starts.shape[1]
+        n = len(self.settler.system.states)
         found = {
             "period_number": ColumnType("i2", many),
             "status": ColumnType("i1", many, codes.INTERRUPTED),
@@ -110,10 +113,12 @@ class ChartWork:
         points = self.settler.system.parameter_points({a: values_a[row], b: values_b[column]})
         n_places, n_starts = len(places), len(self.starts)
         rows = np.repeat(np.arange(n_places), n_starts)
+        modes = None if self.modes is None else self.settler.retold(self.modes)
         if self.carried:
-            found = along_rows(self.settler, points, self._shape[1], self.starts)
+            found = along_rows(self.settler, points, self._shape[1], self.starts, modes)
         else:
-            found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)))
+            every = None if modes is None else np.tile(modes, n_places)
+            found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)), modes=every)
         arrays = {
             "period_number": found.period_number,
             "status": found.status,
@@ -145,13 +150,16 @@ class ChartWork:
         return kept
 
 
-def along_rows(settler: Settler, points: FloatArray, length: int, starts: FloatArray) -> Settled:
+def along_rows(
+    settler: Settler, points: FloatArray, length: int, starts: FloatArray, modes: IntArray | None = None
+) -> Settled:
     """Each row of ``length`` points from each start, the state carried along it.
 
     Parameters
     ----------
     points : array (rows * length, n_parameters)
-    starts : array (S, n)
+    starts : array (S, n + memory)
+    modes : array (S,), optional
 
     Returns
     -------
@@ -159,28 +167,31 @@ def along_rows(settler: Settler, points: FloatArray, length: int, starts: FloatA
         In the order (point, start).
     """
     if settler.device == "cuda":
-        return side_by_side(settler, points, length, starts)
+        return side_by_side(settler, points, length, starts, modes)
     parts = []
     for first in range(0, len(points), length):
         rows = np.arange(first, first + length)
-        for start in starts:
-            parts.append(settler.run(points, rows, np.tile(start, (length, 1)), carried=True))
+        for k, start in enumerate(starts):
+            own = None if modes is None else np.tile(modes[k], length)
+            parts.append(settler.run(points, rows, np.tile(start, (length, 1)), carried=True, modes=own))
     order = np.arange(len(points) * len(starts)).reshape(-1, len(starts), length)
     return Settled.joined(parts)[order.transpose(0, 2, 1).ravel()]
 
 
-def side_by_side(settler: Settler, points: FloatArray, length: int, starts: FloatArray) -> Settled:
+def side_by_side(
+    settler: Settler, points: FloatArray, length: int, starts: FloatArray, modes: IntArray | None = None
+) -> Settled:
     """The same, all rows together from point to point, by the exact flow of planar systems.
 
     A run goes on from where the one at the point before has ended; from its start where that one failed, or where a
     stop has moved over its state."""
     n_rows, n_starts = len(points) // length, len(starts)
-    begin = np.tile(starts, (n_rows, 1))
+    begin, own = np.tile(starts, (n_rows, 1)), None if modes is None else np.tile(modes, n_rows)
     first = np.repeat(np.arange(n_rows) * length, n_starts)
     goes_on = np.zeros(len(first), dtype=bool)
     parts: list[Settled] = []
     for column in range(length):
-        rows, found = first + column, Settled.empty(len(first), starts.shape[1])
+        rows, found = first + column, Settled.empty(len(first), len(settler.system.states), settler.width)
         which = np.flatnonzero(goes_on)
         if len(which):
             last, mode = parts[-1].last[which], parts[-1].mode[which]
@@ -189,7 +200,8 @@ def side_by_side(settler: Settler, points: FloatArray, length: int, starts: Floa
             goes_on[which] = carried.status != codes.NO_CONVERGENCE  # with this flow: a start beyond a stop
         which = np.flatnonzero(~goes_on)
         if len(which):
-            found.put(which, settler.run(points, rows[which], begin[which]))
+            there = None if own is None else own[which]
+            found.put(which, settler.run(points, rows[which], begin[which], modes=there))
         parts.append(found)
         goes_on = usable(found.status)
     order = np.arange(len(points) * n_starts).reshape(length, n_rows, n_starts)

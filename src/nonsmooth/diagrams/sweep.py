@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -18,14 +18,14 @@ from nonsmooth.attractors.standing import standing_in_sweep
 from nonsmooth.campaign.run import cores, over_items
 from nonsmooth.diagrams.sweep_pieces import Slot, bin_edges, coarse_values, given_ranges, pieces_of, run_on_gpu
 from nonsmooth.errors import Interrupted
-from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.flow.engines.methods import warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
 from nonsmooth.flow.outputs import out_of_bounds
-from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.flow.starts import first_states, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.progress import Progress
@@ -75,7 +75,8 @@ def sweep(
         Carry the state along with rising or falling values (at equal phase of the forcing), both, or begin every point
         at ``start``.
     start : state or list of states, optional
-        First state; zeros where not given. Several starts show attractors that coexist.
+        First state, as in :func:`nonsmooth.simulate`; zeros where not given. Several starts show attractors that
+        coexist.
     judge : bool
         False: record what follows one transient, settled or not, and leave out ``period_number`` and ``residual``. A
         first look, in half the time.
@@ -149,13 +150,13 @@ def sweep(
         raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
     if gpu and density is not False:
         raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
-    threads, starts = workers_of(options), start_states(system, start)
+    threads, begun = workers_of(options), first_states(system, start)
     settler = replace(
         settler, plan=settler.plan._replace(extremes=extremes), max_period=settler.max_period if judge else 0
     )
     points = system.parameter_points({parameter: numbers})
     if settler.plan.indicator >= 0:
-        refuse_resting(system, starts, points, "sweep")
+        refuse_resting(system, begun, points, "sweep")
     ranges = {} if density is False else given_ranges(system, density)
     work = _Sweep(
         settler,
@@ -163,7 +164,7 @@ def sweep(
         numbers,
         points,
         DIRECTIONS[direction],
-        starts,
+        begun,
         0 if density is False else bins,
         checked_loads(system, loads, "sweep"),
     )
@@ -182,7 +183,7 @@ def sweep(
         work.edges = bin_edges(system, ranges, bins, coarse)
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
     if gpu:
-        run_on_gpu(points, starts, work.slots, options["progress"], parameter)
+        run_on_gpu(points, begun, work.slots, options["progress"], parameter)
     else:
         try:
             work.run(threads, options["progress"])
@@ -203,10 +204,15 @@ class _Sweep:
     numbers: FloatArray
     points: FloatArray
     directions: tuple[str, ...]
-    starts: FloatArray
+    begun: Sequence[State]
     bins: int  # 0: section points are kept
     measured: Quantities
     edges: FloatArray | None = None  # of bins in which they are counted
+
+    @cached_property
+    def starts(self) -> FloatArray:
+        """The states (S, n) at the starts."""
+        return np.array([state.u for state in self.begun])
 
     @cached_property
     def slots(self) -> dict[tuple[int, int], Slot]:
@@ -228,7 +234,7 @@ class _Sweep:
 
         def march(piece: tuple[tuple[int, int], list[int]]) -> None:
             (d, k), order = piece
-            self.slots[d, k].march(tables, order, self.starts[k], self.directions[d] != "none", advance, stop)
+            self.slots[d, k].march(tables, order, self.begun[k], self.directions[d] != "none", advance, stop)
 
         total = len(self.slots) * len(self.points)
         with progress_bar(total, f"sweep over {self.parameter}", progress) as advance:

@@ -14,7 +14,7 @@ import numpy as np
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
@@ -90,7 +90,7 @@ class Slot:
         self,
         tables: Any,
         order: Sequence[int],
-        start: FloatArray,
+        start: State,
         carried: bool,
         advance: Callable[[int], None],
         stop: threading.Event,
@@ -99,12 +99,13 @@ class Slot:
         from nonsmooth.kernels.histogram import count
 
         rows = np.array(order, dtype=np.int64)
-        fit = self.settler.admissible(self.at[rows], np.tile(start, (len(rows), 1)), carried=carried)
+        places, modes = np.tile(start.place, (len(rows), 1)), np.tile(start.counters[0], len(rows))
+        fit = self.settler.admissible(self.at[rows], places, carried=carried)
         self.status[np.delete(rows, fit)] = codes.NO_CONVERGENCE
         advance(len(rows) - len(fit))
         rows, n = rows[fit], len(fit)
         room: dict[str, Any] = {"kept": self.kept, "into": rows} if self.edges is None else {}
-        mapper = Mapper(self.settler, tables, rows, np.tile(start, (n, 1)), **room)
+        mapper = Mapper(self.settler, tables, rows, places[fit], modes[fit], **room)
         run, done = mapper.settle(self.settler.rules(), 2 * carried, False), 0
         try:
             for j, i in enumerate(rows):
@@ -143,7 +144,7 @@ def pieces_of(directions: Sequence[str], n_starts: int, numbers: FloatArray) -> 
 
 
 def run_on_gpu(
-    points: FloatArray, starts: FloatArray, slots: Mapping[tuple[int, int], Slot], progress: Progress, label: str
+    points: FloatArray, starts: Sequence[State], slots: Mapping[tuple[int, int], Slot], progress: Progress, label: str
 ) -> None:
     """All points from each start, on the GPU."""
     from nonsmooth.attractors.settle_cuda import sweep_on_gpu
@@ -153,6 +154,6 @@ def run_on_gpu(
             slot = slots[0, k]
             slot.put(slice(None), sweep_on_gpu(slot.settler, points, start, slot.kept, advance))
             beyond = np.delete(
-                np.arange(len(points)), slot.settler.admissible(points, np.tile(start, (len(points), 1)))
+                np.arange(len(points)), slot.settler.admissible(points, np.tile(start.u, (len(points), 1)))
             )
             slot.status[beyond], slot.period_number[beyond] = codes.NO_CONVERGENCE, 0

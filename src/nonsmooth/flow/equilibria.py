@@ -19,6 +19,7 @@ from nonsmooth.flow.mode_fields import ModeField, mode_field
 from nonsmooth.system.symbolic.numeric import numeric
 
 if TYPE_CHECKING:
+    from nonsmooth.flow.engines.engine import State
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
@@ -113,22 +114,23 @@ def _rests_behind(
     return bool((np.abs(f) <= AT_REST * (np.abs(J) @ (system.scale_vector() + np.abs(u))[field.own])).all())
 
 
-def refuse_resting(system: System, starts: FloatArray, points: FloatArray, verb: str) -> None:
+def refuse_resting(system: System, starts: Sequence[State], points: FloatArray, verb: str) -> None:
     """ValueError where a system without forcing begins at an equilibrium, whatever the parameters: it never returns.
 
     Parameters
     ----------
-    starts : array (S, n)
+    starts : sequence of State
     points : array (P, n_parameters)
         The first, the last and some between are looked at.
     """
     if system.depends_on_time:
         return
-    memory, some = system.memory_vector(), np.unique(np.linspace(0, len(points) - 1, 8).astype(int))
+    some = np.unique(np.linspace(0, len(points) - 1, 8).astype(int))
     at: Equilibrium | None = None
     for start in starts:
         for i in some:
-            at = equilibrium_at(system, start, 0, values=points[i], memory=memory, near=ROUNDING)
+            mode = int(start.counters[0])
+            at = equilibrium_at(system, start.u, mode, values=points[i], memory=start.memory, near=ROUNDING)
             if at is None:
                 return
     if at is not None:

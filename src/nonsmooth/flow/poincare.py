@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import beyond_stops, refuse_beyond_stops, solve_error, warn_if_slow
 from nonsmooth.flow.options import Solver, as_called, solver_of
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
-from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.flow.starts import first_states, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import at_least
@@ -50,7 +49,7 @@ def poincare(
     transient : int
         Returns to pass over first.
     start : state or list of states, optional
-        Zeros where not given.
+        As in :func:`nonsmooth.simulate`; zeros where not given.
 
     Returns
     -------
@@ -67,16 +66,18 @@ def poincare(
     asked = as_called(locals())
     plan = section_plan(system, section)[1]
     plan = plan._replace(extremes=False)
-    starts = start_states(system, start)
+    begun = first_states(system, start)
+    starts = np.array([state.u for state in begun])
     if is_one_start(start):
         refuse_beyond_stops(system, starts)
     if plan.indicator >= 0:
-        refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
+        refuse_resting(system, begun, system.parameter_vector()[None, :], "poincare")
     engine = engine_for(system, **solver_of(options))
     out = engine.kept(len(starts), n)
     points = np.tile(system.parameter_vector(), (len(starts), 1))
-    state = State(starts[0].copy(), system.memory_vector())
-    engine.chain(engine.prepare(points), 0, len(starts), state, starts, plan, transient, n, out)
+    tables = engine.prepare(points)
+    for k, state in enumerate(begun):
+        engine.chain(tables, k, k + 1, state, None, plan, transient, n, out)
     beyond = beyond_stops(system, points, starts)
     out.status[beyond], out.section[beyond], out.section_time[beyond] = codes.BEYOND_STOP, np.nan, np.nan
     if is_one_start(start) and out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):

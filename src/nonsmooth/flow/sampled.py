@@ -70,7 +70,7 @@ def sampled(
     changes, instants, cuts = under(course, state, begin, times[-1]), times, np.zeros(0)
     if changes is not None:
         cuts, instants = changes.times, np.union1d(times, changes.times)
-    start = int(state.counters[0]), np.concatenate([state.u, state.memory])
+    start = int(state.counters[0]), state.place
     # the start itself is a sample too: there the transitions that hold already have been taken
     samples, most = np.append(begin, instants), most * len(instants)
     log = engine.record(tables, state, times[-1], samples, changes=changes, most=most)

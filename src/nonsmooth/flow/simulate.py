@@ -56,10 +56,10 @@ def simulate(
     periods, duration : float
         Length of the run in forcing periods, or in time: one of the two.
     start : mapping, sequence of n floats, or a result of ``simulate``, optional
-        State at t = 0; zeros where not given. A result gives its last state, mode and memory; the forcing begins anew,
-        so let it end after whole periods.
+        State at t = 0; zeros where not given. A mapping may name the memory too, and a ``"mode"``. A result gives its
+        last state, mode and memory; the forcing begins anew, so let it end after whole periods.
     mode : str, optional
-        Mode at the start; that of the result, else the first, where not given. Transitions that already hold are
+        Mode at the start; that of ``start``, else the first, where not given. Transitions that already hold are
         taken first.
     transient : float
         Run this long before recording, in the unit of the length. Time goes on: the record begins at t = transient.

@@ -91,8 +91,13 @@ def plain_start(system: System, start: Any) -> Any:
     """``start`` as data that a result can record: arrays and results as lists of numbers."""
     if isinstance(start, Mapping) and not hasattr(start, "data_vars"):
         return start  # as it was named
-    states = start_states(system, start)[:, : system._description.n_own]
-    return states[0].tolist() if is_one_start(start) else states.tolist()
+    own, usual, found = list(system.states)[: system._description.n_own], system.memory_vector(), list[Any]()
+    for state in first_states(system, start):
+        found.append(state.u[: len(own)].tolist())
+        if state.counters[0] or (state.memory != usual).any():
+            named = zip((*own, *system.memory), (*found[-1], *state.memory.tolist()), strict=True)
+            found[-1] = dict(named) | {"mode": system.modes[int(state.counters[0])]}
+    return found[0] if is_one_start(start) else found
 
 
 def start_states(system: System, start: Any) -> FloatArray:
@@ -120,34 +125,59 @@ def start_states(system: System, start: Any) -> FloatArray:
 
 
 def first_state(system: System, start: Any, mode: str | None = None) -> State:
-    """The one start of a single run: with the mode and the memory that a result of ``simulate`` ended with.
+    """The one start of a single run.
 
     Parameters
     ----------
     mode : str, optional
-        Mode at the start; that of the result, else the first, where not given.
+        Mode at the start; that which ``start`` has, else the first, where not given.
 
     Raises
     ------
     ValueError
         A mode that does not exist, and what :func:`start_states` raises.
     """
-    state = State(start_states(system, start)[0].copy(), system.memory_vector())
-    if hasattr(start, "data_vars"):
-        if "mode" not in start:
-            raise ValueError(
-                "the result given as start has no `mode`: give it whole, or a state of it, run['u'].isel(time=-1)"
-            )
-        ended = start["mode"].attrs["flag_meanings"].split()[int(start["mode"].values[-1])]
-        state.counters[0] = mode_number(system, ended) or 0
-        for i, name in enumerate(system.memory):
-            if name in start:
-                state.memory[i] = float(start[name].values[-1])
+    state = first_states(system, start)[0]
     if mode is not None:
-        if (number := mode_number(system, mode)) is None:
-            raise ValueError(unknown(mode, "a mode", repr(system.name), system.written_out().modes))
-        state.counters[0] = number
+        state.counters[0] = _known_mode(system, mode)
     return state
+
+
+def first_states(system: System, start: Any) -> list[State]:
+    """The starts of runs, each with its mode and memory: those with which a result of ``simulate`` ended, or which a
+    mapping names beside the states; else the first mode, and the memory's initial values.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A mode that does not exist, and what :func:`start_states` raises.
+    """
+    states = [State(u.copy(), system.memory_vector()) for u in start_states(system, start)]
+    for state, one in zip(states, [start] if is_one_start(start) else start, strict=True):
+        known: Mapping[str, Any] = {}
+        if hasattr(one, "data_vars"):
+            if "mode" not in one:
+                raise ValueError(
+                    "the result given as start has no `mode`: give it whole, or a state of it, run['u'].isel(time=-1)"
+                )
+            ended = one["mode"].attrs["flag_meanings"].split()[int(one["mode"].values[-1])]
+            state.counters[0] = mode_number(system, ended) or 0
+            known = {name: one[name].values[-1] for name in system.memory if name in one}
+        elif isinstance(one, Mapping):
+            known = one
+            if "mode" in one:
+                state.counters[0] = _known_mode(system, one["mode"])
+        for i, name in enumerate(system.memory):
+            if name in known:
+                state.memory[i] = _finite(np.array([_number(known[name], name)]), [name])[0]
+    return states
+
+
+def _known_mode(system: System, name: Any) -> int:
+    """The number of a mode; ValueError where there is none."""
+    if (number := mode_number(system, name)) is None:
+        raise ValueError(unknown(str(name), "a mode", repr(system.name), system.written_out().modes))
+    return number
 
 
 def mode_number(system: System, name: Any) -> int | None:
@@ -175,6 +205,8 @@ def _state(system: System, start: Any) -> FloatArray:
         )
     if isinstance(start, Mapping):
         for name in start:
+            if name == "mode" or name in system.memory:
+                continue
             if name not in names:
                 raise ValueError(unknown(name, "a state", repr(system.name), {key: system.states[key] for key in own}))
             if name not in own:

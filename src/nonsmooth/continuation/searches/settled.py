@@ -111,7 +111,7 @@ def _read_round(
         state.u[:], state.counters[:] = settled.points[i], (settled.modes[i], -1, 0, 0)
     state.clock[:], state.settled = 0.0, True
     values, period = system.parameter_vector(), p * float(system.period() or 0.0)
-    start, mode = np.concatenate([state.u, state.memory]), int(state.counters[0])
+    start, mode = state.place, int(state.counters[0])
     log = engine.record(engine.prepare(values[None, :]), state, period, np.empty(0))
     flow, good = VariationalFlow.of(system), log.status in (codes.OK, codes.NOT_GUARANTEED)
     once = round_of(flow, values, log, start, mode, period, p) if good else None

@@ -56,6 +56,11 @@ class State:
 
         return Motion(self.u, self.memory, self.clock, self.counters)
 
+    @property
+    def place(self) -> FloatArray:
+        """The states, then the memory."""
+        return np.concatenate([self.u, self.memory])
+
     def copy(self) -> State:
         return State(self.u.copy(), self.memory.copy(), self.clock.copy(), self.counters.copy(), self.settled)
 

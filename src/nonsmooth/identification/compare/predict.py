@@ -19,6 +19,7 @@ from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.options import longest_period
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.simulate import check_complete
+from nonsmooth.flow.starts import first_state
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.orbits import common_length, energy_distance, fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
@@ -138,7 +139,7 @@ def carried(
         here = {**system.values, name: float(value)}
         systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
     motions, rising = Motions(systems, model, phase), np.argsort(values, kind="stable").tolist()
-    tables, rest = motions.settler.engine.prepare(motions.points), np.zeros(len(system.states))
+    tables, rest = motions.settler.engine.prepare(motions.points), first_state(system, None)
     slots = [Slot(motions.settler, motions.points, None, ()) for _ in words]
     for word, slot in zip(words, slots, strict=True):
         slot.march(tables, rising if word == "up" else rising[::-1], rest, True, lambda _: None, Event())
