@@ -142,3 +142,11 @@ def test_rest_against_either_of_two_stops() -> None:
     assert sorted(found["name"].values) == ["equilibrium in a_open_b_rest", "equilibrium in a_rest_b_open"]
     assert sorted(found["section"].values[:, 0]) == pytest.approx([-1.5, 1.0], abs=1e-9)
     assert found["fraction"].values.sum() == pytest.approx(1.0)
+
+
+def test_what_friction_holds_anywhere_is_one_attractor_of_a_chart() -> None:
+    """Masses under forces below friction stay where they start, on one set of equilibria."""
+    system = rubbed(forcing={"q": lambda t, p: p.F * np.cos(p.w * t)})
+    starts = [{"q": -0.05}, {"q": 0.0}, {"q": 0.08}]
+    found = ns.chart(system, {"F": [0.1, 0.2], "w": [1.0, 1.3]}, start=starts, transient=50, progress=False)
+    assert (found["period_number"] == 1).all() and (found["n_attractors"] == 1).all()

@@ -167,7 +167,45 @@ def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
     engine.chain(engine.prepare(belt.parameter_vector()[None, :]), 0, 1, state, None, Section(), 0, 3, out)
     speed = np.hypot(0.5, 0.2)  # of the arc about the spring's equilibrium
     np.testing.assert_allclose([out.low[0, 1], out.high[0, 1]], [-speed, 0.2], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(out.high[0, 2 + 1], 7.0 - 0.2, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(out.high[0, 2 + 1], 0.0, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+def test_a_cycle_within_a_mode_that_lacks_a_state(method: str) -> None:
+    """x' = a cos t - x alone: x = a (cos t + sin t) / 2 with the multiplier exp(-2 pi), whatever v a start names."""
+    system = ns.System(
+        states=["x", "v"],
+        parameters={"a": 0.5, "c": 0.2},
+        modes={
+            "creep": ns.Mode(lambda t, u, p: (p.a * np.cos(t) - u.x,), states=["x"]),
+            "free": lambda t, u, p: (u.v, p.a * np.cos(t) - u.x - p.c * u.v),
+        },
+        indicators={"far": lambda t, u, p: u.x - 5.0},
+        transitions=[ns.Transition("creep", "free", when="far > 0", reset=lambda t, u, p: (u.x, 0.0))],
+    )
+    options, there = {"method": method, "progress": False}, {"rtol": 0, "atol": 1e-9}
+    points = ns.poincare(system, n=3, transient=20, start={"v": 1.0}, method=method)
+    np.testing.assert_allclose(points["section"], [[0.25, np.nan]] * 3, **there)
+    found = ns.sweep(system, "a", [0.5, 1.0], start={"v": 1.0}, keep=5, **options)
+    assert found["status"].values.tolist() == [0, 0] and found["period_number"].values.tolist() == [1, 1]
+    np.testing.assert_allclose(found["section"][:, 0], [[0.25, np.nan], [0.5, np.nan]], **there)
+    np.testing.assert_allclose(found["maximum"], np.array([[0.5, np.nan], [1.0, np.nan]]) / np.sqrt(2), **there)
+    np.testing.assert_allclose(found["minimum"], -found["maximum"], **there)
+    lines = ns.amplitude_spectrum(system, start={"v": 1.0}, method=method)["amplitude"]  # without a warning
+    np.testing.assert_allclose(lines.values[:2], [[0.0, np.nan], [0.5 / np.sqrt(2), np.nan]], **there)
+    counted = ns.sweep(system, "a", [0.5, 1.0], start={"v": 1.0}, keep=5, density={"v": (-1, 1)}, bins=4, **options)
+    assert counted["density"].sel(state="v").values.sum() == 0
+    assert counted["outside"].sel(state="v").values.tolist() == [5, 5]
+    plane = ns.basins(system, {"x": [-1.0, 1.0], "v": [-1.0, 0.5]}, **options)
+    assert (plane["label"] == 0).all() and plane["confirmed"].values.tolist() == [1]
+    np.testing.assert_allclose(plane["lyapunov"], [-1.0], **there)
+    np.testing.assert_allclose(plane["section"], [[0.25, np.nan]], **there)
+    shares = ns.basin_fractions(system, "a", [0.5], n_starts=4, box={"x": (-1, 1), "v": (-1, 1)}, **options)
+    np.testing.assert_allclose(shares["section"], [[[0.25, np.nan]]], **there)
+    grid = {"a": [0.5, 1.0], "c": [0.1, 0.2]}
+    chart = ns.chart(system, grid, start=[{"v": -1.0}, {"x": 1.0, "v": 2.0}], lyapunov=40, **options)
+    assert (chart["n_attractors"] == 1).all() and (chart["period_number"] == 1).all()
+    np.testing.assert_allclose(chart["lyapunov"], -1.0, rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize(("length", "rate"), [(1.0, 2 * np.pi), (1e-3, 200.0)])

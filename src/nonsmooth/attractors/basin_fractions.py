@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from nonsmooth.attractors.basins import failed, settler_of
+from nonsmooth.attractors.basins import failed, settler_of, shown
 from nonsmooth.attractors.basins_attractors import Attractor, find_attractors
 from nonsmooth.attractors.basins_found import NONE, Patience
 from nonsmooth.attractors.basins_matching import numbered
@@ -119,7 +119,7 @@ def _followed(settler: Settler, points: FloatArray, asked: Mapping[str, Any], ru
         before = point
         last = dict(zip(ids, found, strict=True))
         seen |= {k: replace(item, tree=None) for k, item in last.items()}
-        per_value[i] = last
+        per_value[i] = dict(zip(ids, shown(settler, found), strict=True))
         labels[i] = np.append(ids, [-2, -1])[label] if len(ids) else label
     return _dataset(settler.system, settler.engine.name, asked, per_value, labels, status, len(seen))
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
@@ -174,7 +175,7 @@ def _dataset(
         provenance(named, "basins", asked, method=settler.engine.name),
         values,
         label,
-        found,
+        shown(settler, found),
         status=status.reshape(label.shape),
         fixed={name: rest[names.index(name)] for name in names if name not in values},
         per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": told * np.array(shocks)},
@@ -203,6 +204,14 @@ def settler_of(system: System, verb: str, options: Campaign) -> tuple[Settler, i
         )
     settler, stored = settler_for(system, verb, options), options["store"] is not None or options["client"] is not None
     return settler, BATCH if settler.device == "cuda" else STORED if stored else CHUNK
+
+
+def shown(settler: Settler, found: Iterable[Attractor]) -> list[Attractor]:
+    """Attractors for a result: a state that the mode of a section point lacks is NaN there."""
+    copies = [replace(item, points=item.points.copy()) for item in found]
+    for item in copies:
+        settler.engine.hide(item.points, item.modes)
+    return copies
 
 
 def failed(status: Any) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from nonsmooth.attractors.basins_candidate import CandidateSearch, among
 from nonsmooth.attractors.basins_found import Attractor, Patience
 from nonsmooth.attractors.basins_newton import STEP, Cycle, confirmed_cycle, exponent_on
-from nonsmooth.attractors.settled import Settled
+from nonsmooth.attractors.settled import Settled, half_ranges
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.attractors.standing import label_standing
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
@@ -124,7 +124,7 @@ def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     )
 
 
-def _held(settler: Settler, point: FloatArray, place: FloatArray, mode: int, p: int, size: FloatArray) -> Any:
+def held_states(settler: Settler, point: FloatArray, place: FloatArray, mode: int, p: int, size: FloatArray) -> Any:
     """Marks of states (n,) that are as far beside the cycle after p returns as before: friction holds them there."""
     n, ends = len(size), []
     off = STEP * np.vstack([np.zeros(n), np.diag(size)])
@@ -139,12 +139,12 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
     p, place, mode = int(run.period_number[0]), run.last[0], int(run.mode[0])
     n = run.maximum.shape[1]
     least = settler.least_at(run.maximum[0], run.minimum[0])
-    size = np.maximum(0.5 * (run.maximum[0] - run.minimum[0]), least)
+    size = half_ranges(run.maximum[0], run.minimum[0], least)
     cycle = confirmed_cycle(settler, point, place, mode, p, size)
     held, confirmed = np.full(n, np.nan), cycle is not None
     if cycle is None:
         moved = run.maximum[0] - run.minimum[0]
-        beside = settler.plan.indicator < 0 and _held(settler, point, place, mode, p, size)
+        beside = settler.plan.indicator < 0 and held_states(settler, point, place, mode, p, size)
         held = np.where((moved == 0.0) | beside, moved, np.nan)  # neighbours stand beside it
         once = settler.trace(point, place, mode, 0, p)
         if len(once.points):

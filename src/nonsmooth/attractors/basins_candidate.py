@@ -13,7 +13,7 @@ import numpy as np
 
 from nonsmooth.attractors.basins_found import Attractor, Patience
 from nonsmooth.attractors.basins_newton import confirmed_cycle, exponent_on
-from nonsmooth.attractors.settled import SectionTrace
+from nonsmooth.attractors.settled import SectionTrace, half_ranges
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.kernels.hybrid import codes
@@ -86,7 +86,7 @@ class CandidateSearch:
         )
         exponent, error = float(exponents[0]), float(errors[0])
         least = settler.least_at(maximum, minimum)
-        size = np.maximum(0.5 * (maximum - minimum), least)
+        size = half_ranges(maximum, minimum, least)
         end, last = long.end, long.mode
         doubt = 3.0 * error + LEAST_EXPONENT * len(long.points) / long.times[-1]
         if exponent < -doubt:

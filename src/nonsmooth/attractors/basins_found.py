@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.attractors.settled import half_ranges
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet
 from nonsmooth.results.labels import kind_of
@@ -62,4 +63,4 @@ class Attractor:
     @property
     def size(self) -> FloatArray:
         """Half the range of each state on it, and no less than the least size."""
-        return np.maximum(0.5 * (self.maximum - self.minimum), self.least)
+        return half_ranges(self.maximum, self.minimum, self.least)

@@ -43,9 +43,15 @@ def least_sizes(method: str, scale: FloatArray) -> tuple[FloatArray, float]:
     return (scale, 1.0) if method == "rkf45" else (LEAST * scale, ROUNDED)
 
 
+def half_ranges(maximum: FloatArray, minimum: FloatArray, least: FloatArray) -> FloatArray:
+    """Half the range of each state (..., n), and no less than the least size: this of one that no mode visited has."""
+    return np.asarray(np.fmax(0.5 * (maximum - minimum), least))
+
+
 @dataclass
 class Settled:
-    """Results of J jobs. Extremes and counts are over whole cycles where there is a period, else the kept window.
+    """Results of J jobs. Extremes and counts are over whole cycles where there is a period, else the kept window; of a
+    state that no mode visited has NaN.
 
     ``multiplier`` is the largest modulus over ``period_number`` returns (NaN: unknown).
     """
@@ -96,6 +102,8 @@ class Settled:
         """The same with what was found out about the jobs; statuses of results in place of the kernel's codes."""
         for name in ("period_number", "status", "residual", "multiplier"):
             getattr(self, name)[:] = getattr(jobs, name)
+        unseen = self.maximum < self.minimum
+        self.maximum[unseen], self.minimum[unseen] = np.nan, np.nan
         failed = ~usable(self.status)
         self.status[failed] = [result_status(code) for code in self.status[failed]]
         return self

@@ -206,7 +206,7 @@ class Settler:
     def least_at(self, maximum: FloatArray, minimum: FloatArray) -> FloatArray:
         """The least size of a motion with these extremes (..., n)."""
         least, rounded = least_sizes(self.engine.name, self.system.scale_vector())
-        return np.maximum(least, rounded * np.maximum(np.abs(maximum), np.abs(minimum)))
+        return np.asarray(np.fmax(least, rounded * np.maximum(np.abs(maximum), np.abs(minimum))))
 
     @property
     def section_phase(self) -> float:

@@ -59,10 +59,11 @@ def label_standing(
 
 
 def standing_in_sweep(
-    settler: Settler, points: FloatArray, arrays: dict[str, Any], first: FloatArray
+    settler: Settler, points: FloatArray, arrays: dict[str, Any], first: FloatArray, modes: IntArray
 ) -> dict[str, Any]:
     """Complete the arrays of a sweep (directions, starts, values) where its points stand, and return what else is known
-    of them: the name of the equilibrium, or of the set of them, and its extent. ``first`` are the first kept points."""
+    of them: the name of the equilibrium, or of the set of them, and its extent. ``first`` are the first kept points,
+    ``modes`` those there."""
     system, tolerance = settler.system, STANDS * settler.tolerance
     shape, n = first.shape[:-1], first.shape[-1]
     status, period = arrays["status"], arrays["period_number"]
@@ -74,11 +75,13 @@ def standing_in_sweep(
         stood = next((one for one in known if one.holds(u[None, :], tolerance)[0]), None)
         if stood is None:
             continue
-        names[d, k, i], extent[:, d, k, i] = stood.name(system.modes), (stood.lower, stood.upper)
+        shown = np.array([u, stood.lower, stood.upper])
+        settler.engine.hide(shown, np.full(3, modes[d, k, i]))
+        names[d, k, i], extent[:, d, k, i] = stood.name(system.modes), shown[1:]
         if status[d, k, i] == codes.NO_CONVERGENCE:
             status[d, k, i], period[d, k, i] = codes.OK, 1
             for key in ("section", "maximum", "minimum"):
-                arrays[key][d, k, i] = u
+                arrays[key][d, k, i] = shown[0]
             for key in ("residual", "crossings_per_period", "contacts_per_period"):
                 arrays[key][d, k, i] = 0.0
     if not names.any():
@@ -97,7 +100,7 @@ def _stands(
 ) -> Any:
     """Marks of runs that do not move any more, or hardly, at places u (..., n)."""
     with np.errstate(invalid="ignore"):
-        still = (maximum - minimum <= tolerance * (system.scale_vector() + np.abs(u))).all(axis=-1)
+        still = ~(maximum - minimum > tolerance * (system.scale_vector() + np.abs(u))).any(axis=-1)
     still &= (period == 1) | (status == codes.SLOW)
     if system.period() is None and not system.explicit_time:
         still |= (status == codes.NO_CONVERGENCE) & np.isfinite(u).all(axis=-1)
@@ -132,14 +135,16 @@ def _attractor(settler: Settler, point: FloatArray, run: Settled, stood: Equilib
         multiplier = float(run.multiplier[0])
         with np.errstate(divide="ignore"):
             exponent = float(np.log(multiplier) / period)
+    extent = np.array([stood.upper, stood.lower])
+    settler.engine.hide(extent, np.full(2, mode))
     return Attractor(
         1,
         points,
         np.array([mode] * len(points)),
         run.last[0],
         int(run.mode[0]),
-        stood.upper,
-        stood.lower,
+        extent[0],
+        extent[1],
         multiplier,
         exponent,
         0.0,

@@ -116,12 +116,12 @@ def amplitude_spectrum(
             rate, base = length * each / span, length / span
             values = _sampled(system, start, begin, span, length * each, how)
         apart = np.abs(values[-1] - values[0])
-        if not count or (apart <= CLOSED * np.ptp(values, axis=0)).all():
+        if not count or not (apart > CLOSED * np.ptp(values, axis=0)).any():
             break
     else:
         warnings.warn(
-            f"{system.name!r}: the record of {length} period(s) does not close ({apart.max():.2g} apart), so its lines "
-            f"are off by as much; give a longer transient than {transient}",
+            f"{system.name!r}: the record of {length} period(s) does not close ({np.nanmax(apart):.2g} apart), so its "
+            f"lines are off by as much; give a longer transient than {transient}",
             stacklevel=2,
         )
     values = values[:-1]

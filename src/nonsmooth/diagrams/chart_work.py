@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.attractors.basins_attractors import find_attractors, held_states
+from nonsmooth.attractors.basins_found import NONE
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.work import CHUNK, ColumnType
@@ -213,24 +215,30 @@ def attractors_among(found: Settled, n_places: int, n_starts: int, settler: Sett
 
     Cycles are told apart by period number and extremes, which do not depend on where in the cycle a run ended. Where
     both agree but the last section points do not, the section points of a whole cycle decide: cycles that differ by a
-    shift in time have equal extremes. What is still settling, or failed, is none.
+    shift in time have equal extremes. Cycles that are as wide, but elsewhere in what friction holds, are counted as in
+    basins. What is still settling, or failed, is none.
     """
     period = found.period_number.reshape(n_places, n_starts)
     wandering = found.status.reshape(n_places, n_starts) == codes.NOT_PERIODIC
-    extremes = np.concatenate([found.maximum, found.minimum], axis=1).reshape(n_places, n_starts, -1)
-    least = settler.least_at(found.maximum, found.minimum)
-    size = np.maximum(found.maximum - found.minimum, least).reshape(n_places, n_starts, -1)
+    extremes = np.stack([found.maximum, found.minimum], axis=1).reshape(n_places, n_starts, 2, -1)
+    moved = extremes[:, :, 0] - extremes[:, :, 1]
+    size = np.fmax(moved, settler.least_at(extremes[:, :, 0], extremes[:, :, 1]))
     n = size.shape[2]
     last, mode = found.last.reshape(n_places, n_starts, -1)[..., :n], found.mode.reshape(n_places, n_starts)
-    count = wandering.any(axis=1).astype(np.int64)
+    count, held = wandering.any(axis=1).astype(np.int64), np.zeros(n_places, dtype=bool)
     every, whole = settler.plan.every, replace(settler, plan=settler.plan._replace(every=1))
     for k in range(n_starts):
         new = period[:, k] > 0
         for j in range(k):
-            near = np.abs(extremes[:, k] - extremes[:, j]) <= SAME * np.tile(size[:, k], 2)
-            alike = new & (period[:, j] == period[:, k]) & near.all(axis=1)
+            same = new & (period[:, j] == period[:, k])
+            elsewhere: Any = (np.abs(extremes[:, k] - extremes[:, j]) > SAME * size[:, k, None]).any(axis=1)
+            alike = same & ~elsewhere.any(axis=1)
             apart = np.abs(last[:, k] - last[:, j]) > POINT * size[:, k]
             apart = apart.any(axis=1) | (mode[:, k] != mode[:, j])
+            as_wide = same & ~alike & ~(np.abs(moved[:, k] - moved[:, j]) > SAME * size[:, k]).any(axis=1)
+            for i in np.flatnonzero(as_wide & ~held) if settler.plan.indicator < 0 else ():
+                at = points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), int(period[i, j])
+                held[i] = held_states(settler, *at, 0.5 * size[i, j])[elsewhere[i]].all()
             for i in np.flatnonzero(alike & apart):
                 run = whole.trace(
                     points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), 0, every * int(period[i, j])
@@ -239,4 +247,7 @@ def attractors_among(found: Settled, n_places: int, n_starts: int, settler: Sett
                 alike[i] = at.any() or not len(run.points)
             new &= ~alike
         count += new
+    for i in np.flatnonzero(held):
+        labels = find_attractors(settler, points[i : i + 1], found[i * n_starts : (i + 1) * n_starts], NONE)[1]
+        count[i] = wandering[i].any() + len(set(labels[labels >= 0]))
     return count

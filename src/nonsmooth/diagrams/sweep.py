@@ -256,7 +256,7 @@ class _Sweep:
             kept, there = slot.kept, usable(slot.status)
             ends = (kept.high[:, :n], kept.low[:, :n]) if extremes else (np.abs(kept.section).max(axis=1),)
             sizes += [np.abs(end[there]) for end in ends]
-        return np.nan_to_num(np.vstack(sizes)).max(axis=0)
+        return np.nan_to_num(np.vstack(sizes), posinf=0.0).max(axis=0)
 
     def gather(self, name: str) -> np.ndarray:
         """An array of all slots, over direction and start."""
@@ -283,7 +283,8 @@ class _Sweep:
             "status": gather("status"),
         }
         if self.edges is None:
-            arrays["section"] = whole(gather("kept.section"))
+            arrays["section"], modes = whole(gather("kept.section")), gather("kept.section_mode")
+            settler.engine.hide(arrays["section"], modes)
         else:
             arrays["density"] = gather("counts")
             arrays["outside"] = gather("outside")
@@ -293,16 +294,19 @@ class _Sweep:
         if asked["extremes"]:
             traced, n = system.traced, len(system.states)
             ends = [n, n + len(traced.indicators)]
-            high, low = (np.split(whole(gather(f"kept.{end}")), ends, axis=-1) for end in ("high", "low"))
+            tops, bottoms = (whole(gather(f"kept.{end}")) for end in ("high", "low"))
+            seen = ~np.isinf(tops)  # by the kernel: else a state that no mode visited has, or an output
+            high, low = (np.split(np.where(seen, one, np.nan), ends, axis=-1) for one in (tops, bottoms))
             arrays["maximum"], arrays["minimum"] = high[0], low[0]
             arrays["clearance"] = np.where(armed_signs(traced, self.points[0]) > 0, -high[1], low[1])
             if system.outputs:
-                unknown = out_of_bounds(traced, self.points, high[2], low[2]) | np.isinf(high[2])
+                unknown = out_of_bounds(traced, self.points, high[2], low[2])
                 arrays["output_maximum"], arrays["output_minimum"] = (
                     np.where(unknown, np.nan, one[2]) for one in (high, low)
                 )
         if asked["judge"] and self.edges is None:
-            arrays |= standing_in_sweep(settler, self.points, arrays, gather("kept.section")[..., 0, :])
+            first = gather("kept.section")[..., 0, :], modes[..., 0]
+            arrays |= standing_in_sweep(settler, self.points, arrays, *first)
         loaded = gather("loads")  # by name
         loads = {
             name: (np.array([[one[name] for one in row] for row in loaded]), *words)

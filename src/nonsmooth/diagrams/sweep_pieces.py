@@ -116,6 +116,7 @@ class Slot:
                     for part, own in zip(self.kept[1:6], mapper.kept[1:6], strict=True):
                         part[i] = own[0]
                     if usable(mapper.jobs.status[j]):
+                        self.settler.engine.hide(mapper.kept.section, mapper.kept.section_mode)
                         count(mapper.kept.section, 0, self.edges, self.counts[i], self.outside[i])
                 done = j + 1
                 advance(1)

@@ -83,6 +83,7 @@ def poincare(
     if is_one_start(start) and out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
         raise solve_error(int(out.status[0]), begun=(system, starts[0]))
     warn_if_slow(system, starts, out.section)
+    engine.hide(out.section, out.section_mode)
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.schema import section_points

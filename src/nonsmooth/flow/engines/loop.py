@@ -177,6 +177,11 @@ class Engine(ABC):
         """(modes, n) 1 where a mode has not that state."""
         return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
 
+    def hide(self, u: FloatArray, modes: Any) -> None:
+        """Make NaN of the states that their modes lack, as results show them."""
+        if self.lacking.any():
+            u[self.lacking[modes] == 1] = np.nan
+
     @cached_property
     def _none(self) -> Any:
         """No samples, no crossings, no touches: of most runs from one sample of a controller to the next."""
@@ -301,10 +306,10 @@ class Engine(ABC):
             touched = [part[by_time] for part in touches]
         log = TrajectoryLog(*(*sampled[1:], *taken, *touched, int(code)))
         if self.lacking.any():
-            lacking, jumps = self.lacking == 1, self.traced.transitions
-            log.sample_u[lacking[log.sample_mode] & (log.sample_mode >= 0)[:, None]] = np.nan
-            log.u_before[lacking[[t.source for t in jumps]][log.crossing_transition]] = np.nan
-            log.u_after[lacking[[t.target for t in jumps]][log.crossing_transition]] = np.nan
+            ends = np.array([(t.source, t.target) for t in self.traced.transitions], dtype=np.int64).reshape(-1, 2)
+            for u, modes in zip((log.u_before, log.u_after), ends[log.crossing_transition].T, strict=True):
+                self.hide(u, modes)
+            self.hide(log.sample_u, log.sample_mode)
         return log
 
 

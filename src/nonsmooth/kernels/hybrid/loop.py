@@ -144,6 +144,10 @@ def begin(i, form, net, section, motion, tables, work):
         tally[BEGUN], tally[MODE] = 1, motion.counters[0]
         memo[TIME], memo[PERIODS], memo[SINCE] = motion.clock[0], motion.clock[1], NO_END
         prepare(i, form, motion, tables, work)
+        if tally[MODE] < form.lacking.shape[0]:
+            for j in range(min(motion.u.shape[0], form.lacking.shape[1])):
+                if form.lacking[tally[MODE], j] != 0:  # whatever a start says of it
+                    work.w[j] = 0.0
         if MAY_WAIT != 0 and motion.counters[1] != 1 and net.together[tally[MODE]] >= 0:
             tally[BEGUN], tally[STARTS], tally[WAITS] = 0, 1, net.together[tally[MODE]] + 1
             return PAUSED
