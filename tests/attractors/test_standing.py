@@ -144,6 +144,64 @@ def test_rest_against_either_of_two_stops() -> None:
     assert found["fraction"].values.sum() == pytest.approx(1.0)
 
 
+def told_by_memory(**shape: Any) -> ns.System:
+    """x'' + 2 c x' + x = d, c = 0.05 and d = 0, but 0.3 and ``where`` for whatever has once passed x = 1."""
+    where = shape.pop("where")
+
+    def field(t: Any, u: Any, p: Any) -> Any:
+        return u.v, p.d - u.x - 2 * p.c * u.v
+
+    return ns.System(
+        states=["x", "v"],
+        parameters={"k": 1.0},
+        memory={"c": 0.05, "d": 0.0},
+        modes={"before": field, "behind": field},
+        indicators={"speed": lambda t, u, p: u.v, "far": lambda t, u, p: u.x - 1.0},
+        transitions=[
+            ns.Transition(
+                "before", "behind", when="far > 0", write={"c": lambda t, u, p: 0.3, "d": lambda t, u, p: where}
+            )
+        ],
+        **shape,
+    )
+
+
+def test_equilibria_are_those_of_the_memory_with_which_runs_end() -> None:
+    """One place, and two dampings; two places."""
+    plane = {"x": [-2.0, 0.5], "v": [-0.1, 0.2]}
+    found = ns.basins(told_by_memory(where=0.0), plane, section=ns.Poincare("speed"), progress=False)
+    assert found["label"].values.tolist() == [[0, 0], [1, 1]]
+    assert found["lyapunov"].values == pytest.approx([-0.3, -0.05], abs=1e-12)
+    system = told_by_memory(where=0.5, period=1.0)
+    found = ns.basins(system, plane, progress=False)
+    assert found["label"].values.tolist() == [[0, 0], [1, 1]]
+    assert found["maximum"].sel(state="x").values == pytest.approx([0.5, 0.0], abs=1e-12)
+    assert found["lyapunov"].values == pytest.approx([-0.3, -0.05], abs=1e-6)
+    swept = ns.sweep(system, "k", [1.0, 2.0], start=[{"x": -2.0}, {"x": 0.5}], direction="both", progress=False)
+    assert (swept["equilibrium"] == "equilibrium in before").all()
+    ends = swept["equilibrium_minimum"].sel(state="x")
+    assert ends.values == pytest.approx(np.full(ends.shape, [0.5, 0.0]), abs=1e-12)
+
+
+def test_a_memory_that_no_equation_knows_tells_no_equilibria_apart() -> None:
+    """It counts how often a mass that is pulled to 0 has passed 0.5 on its way."""
+    modes = {name: lambda t, u, p: (u.v, -u.x - 0.4 * u.v) for name in ("left", "right")}
+    system = ns.System(
+        states=["x", "v"],
+        parameters={"k": 1.0},
+        memory={"passes": 0.0},
+        modes=modes,
+        indicators={"place": lambda t, u, p: u.x - 0.5},
+        transitions=[
+            ns.Transition("left", "right", when="place > 0", write={"passes": lambda t, u, p: p.passes + 1}),
+            ns.Transition("right", "left", when="place < 0"),
+        ],
+        period=1.0,
+    )
+    found = ns.basins(system, {"x": [-4.0, -1.5, 0.2], "v": [0.0, 0.1]}, progress=False)
+    assert (found["label"] == 0).all() and found["fraction"].values.tolist() == [1.0]
+
+
 def test_what_friction_holds_anywhere_is_one_attractor_of_a_chart() -> None:
     """Masses under forces below friction stay where they start, on one set of equilibria."""
     system = rubbed(forcing={"q": lambda t, p: p.F * np.cos(p.w * t)})

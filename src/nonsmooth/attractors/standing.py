@@ -5,6 +5,7 @@ Under a forcing such a run repeats itself with nothing moving; without one it me
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,33 +38,51 @@ def label_standing(
 ) -> None:
     """Label the runs that ended at equilibria; sets of them not met before become attractors."""
     system, tolerance = settler.system, STANDS * settler.tolerance
-    u = runs.last[:, : len(system.states)]
+    u, memory = runs.last[:, : len(system.states)], _memory(system, runs.last)
     still = _stands(system, tolerance, u, runs.maximum, runs.minimum, runs.period_number, runs.status)
     near = np.where(runs.status == codes.SLOW, CREEPS, tolerance)
+
+    def label(stood: EquilibriumSet, number: int, there: FloatArray) -> None:
+        here = still & (memory == there).all(axis=1)
+        here[here] = stood.holds(u[here], near[here])
+        labels[which[here]], status[which[here]] = number, codes.OK
+        still[here] = False
+
     for number, attractor in enumerate(found):
         if attractor.standing is not None and still.any():
-            _label(attractor.standing, number, u, still, near, which, labels, status)
-    affine, known, tried = False, [], 0
+            label(attractor.standing, number, _memory(system, attractor.end[None])[0])
+    affine, known, at, tried = False, [], memory[:0], 0
     while still.any() and tried < TRIES:
         first = int(np.argmax(still))
-        if not affine:
-            known = equilibrium_sets(system, u[first], values=point[0])
+        if not (affine and (memory[first] == at).all()):
+            at = memory[first]
+            known = equilibrium_sets(system, u[first], values=point[0], memory=at)
             traced = system.traced
             affine = all(mode_field(traced, mode).affine for mode in range(len(traced.mode_names)))
         stood = next((one for one in known if one.holds(u[first : first + 1], near[first])[0]), None)
         if stood is None:
             still[first], tried = False, tried + (not affine)
             continue
-        _label(stood, len(found), u, still, near, which, labels, status)
-        found.append(_attractor(settler, point, runs[first : first + 1], stood))
+        label(stood, len(found), at)
+        found.append(_attractor(settler, point, runs[first : first + 1], stood, at))
+
+
+def _memory(system: System, last: FloatArray) -> FloatArray:
+    """The memory at places (..., width), on which equilibria depend: that of a start where no field and no condition
+    knows it (a count of impacts tells no equilibria apart)."""
+    traced, n, memory = system.traced, len(system.states), system.memory_vector()
+    expressions = (*chain.from_iterable(traced.fields), *traced.indicators)
+    if traced.m and any(one.free_symbols & set(traced.m) for one in expressions):
+        return last[..., n : n + len(memory)]
+    return np.broadcast_to(memory, (*last.shape[:-1], len(memory)))
 
 
 def standing_in_sweep(
-    settler: Settler, points: FloatArray, arrays: dict[str, Any], first: FloatArray, modes: IntArray
+    settler: Settler, points: FloatArray, arrays: dict[str, Any], first: FloatArray, modes: IntArray, last: FloatArray
 ) -> dict[str, Any]:
     """Complete the arrays of a sweep (directions, starts, values) where its points stand, and return what else is known
     of them: the name of the equilibrium, or of the set of them, and its extent. ``first`` are the first kept points,
-    ``modes`` those there."""
+    ``modes`` those there, ``last`` the places where runs ended."""
     system, tolerance = settler.system, STANDS * settler.tolerance
     shape, n = first.shape[:-1], first.shape[-1]
     status, period = arrays["status"], arrays["period_number"]
@@ -71,7 +90,7 @@ def standing_in_sweep(
     names, extent = np.full(shape, "", dtype=object), np.full((2, *shape, n), np.nan)
     for d, k, i in np.argwhere(stands):
         u = first[d, k, i]
-        known = equilibrium_sets(system, u, values=points[i])
+        known = equilibrium_sets(system, u, values=points[i], memory=_memory(system, last[d, k, i]))
         stood = next((one for one in known if one.holds(u[None, :], tolerance)[0]), None)
         if stood is None:
             continue
@@ -107,29 +126,15 @@ def _stands(
     return still
 
 
-def _label(
-    stood: EquilibriumSet,
-    number: int,
-    u: FloatArray,
-    still: Any,
-    near: FloatArray,
-    which: IntArray,
-    labels: IntArray,
-    status: IntArray,
-) -> None:
-    here = still.copy()
-    here[still] = stood.holds(u[still], near[still])
-    labels[which[here]], status[which[here]] = number, codes.OK
-    still &= ~here
-
-
-def _attractor(settler: Settler, point: FloatArray, run: Settled, stood: EquilibriumSet) -> Attractor:
+def _attractor(
+    settler: Settler, point: FloatArray, run: Settled, stood: EquilibriumSet, memory: FloatArray
+) -> Attractor:
     """The attractor of a run that has ended at an equilibrium; neighbours within a set neither part nor meet."""
     system, mode = settler.system, stood.modes[0]
     points = np.array([stood.point, *(one.u for one in stood.extremes)]) if stood.free else stood.point[None, :]
     multiplier, exponent, period = 1.0, 0.0, system.period_at(point[0])
     if not stood.free and period is None:
-        J = mode_field(system.traced, mode).evaluate(stood.point, point[0], system.memory_vector())[1]
+        J = mode_field(system.traced, mode).evaluate(stood.point, point[0], memory)[1]
         multiplier, exponent = np.nan, float(sorted_eigenvalues(J)[0].real)
     elif not stood.free:
         multiplier = float(run.multiplier[0])

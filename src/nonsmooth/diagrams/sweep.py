@@ -305,7 +305,7 @@ class _Sweep:
                     np.where(unknown, np.nan, one[2]) for one in (high, low)
                 )
         if asked["judge"] and self.edges is None:
-            first = gather("kept.section")[..., 0, :], modes[..., 0]
+            first = gather("kept.section")[..., 0, :], modes[..., 0], gather("last")
             arrays |= standing_in_sweep(settler, self.points, arrays, *first)
         loaded = gather("loads")  # by name
         loads = {

@@ -85,6 +85,7 @@ class Slot:
         self.period_number = np.zeros(points, dtype=np.int64)
         self.residual, self.crossings, self.contacts = np.full((3, points), np.nan)
         self.status = np.full(points, codes.INTERRUPTED, dtype=np.int8)
+        self.last = np.full((points, settler.width), np.nan)
 
     def march(
         self,
@@ -125,7 +126,7 @@ class Slot:
 
     def put(self, rows: Any, found: Settled, loaded: bool = True) -> None:
         """Take the verdicts on some parameter values; the loads too."""
-        for name in ("period_number", "residual", "crossings", "contacts", "status"):
+        for name in ("period_number", "residual", "crossings", "contacts", "status", "last"):
             getattr(self, name)[rows] = getattr(found, name)
         if self.loads and loaded:
             for name, values in self.settler.loads(self.at, np.arange(len(self.at))[rows], found).items():
