@@ -124,7 +124,7 @@ def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     )
 
 
-def held_states(settler: Settler, point: FloatArray, place: FloatArray, mode: int, p: int, size: FloatArray) -> Any:
+def _held(settler: Settler, point: FloatArray, place: FloatArray, mode: int, p: int, size: FloatArray) -> Any:
     """Marks of states (n,) that are as far beside the cycle after p returns as before: friction holds them there."""
     n, ends = len(size), []
     off = STEP * np.vstack([np.zeros(n), np.diag(size)])
@@ -144,7 +144,7 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
     held, confirmed = np.full(n, np.nan), cycle is not None
     if cycle is None:
         moved = run.maximum[0] - run.minimum[0]
-        beside = settler.plan.indicator < 0 and held_states(settler, point, place, mode, p, size)
+        beside = settler.plan.indicator < 0 and _held(settler, point, place, mode, p, size)
         held = np.where((moved == 0.0) | beside, moved, np.nan)  # neighbours stand beside it
         once = settler.trace(point, place, mode, 0, p)
         if len(once.points):

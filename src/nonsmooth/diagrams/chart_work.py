@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.attractors.basins_attractors import find_attractors, held_states
+from nonsmooth.attractors.basins_attractors import find_attractors
 from nonsmooth.attractors.basins_found import NONE
+from nonsmooth.attractors.basins_newton import STEP
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.work import CHUNK, ColumnType
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.judging.judge import ALONG
 
 SIDE_BY_SIDE = 1 << 21  # places of one chunk of carried rows on a GPU, at most: a gigabyte while it is computed
 SAME = 1e-6  # extremes that agree to this part of the motion's size belong to one attractor
@@ -237,8 +239,11 @@ def attractors_among(found: Settled, n_places: int, n_starts: int, settler: Sett
             apart = apart.any(axis=1) | (mode[:, k] != mode[:, j])
             as_wide = same & ~alike & ~(np.abs(moved[:, k] - moved[:, j]) > SAME * size[:, k]).any(axis=1)
             for i in np.flatnonzero(as_wide & ~held) if settler.plan.indicator < 0 else ():
-                at = points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), int(period[i, j])
-                held[i] = held_states(settler, *at, 0.5 * size[i, j])[elsewhere[i]].all()
+                beside, off = found.last[i * n_starts + j].copy(), STEP * size[i, j]
+                beside[:n] += np.where(elsewhere[i], off, 0.0)
+                run = settler.trace(points[i : i + 1], beside, int(mode[i, j]), 0, int(period[i, j]))
+                back = np.abs(run.points[-1:] - beside[:n]) <= ALONG * off
+                held[i] = len(back) and back[0, elsewhere[i]].all()
             for i in np.flatnonzero(alike & apart):
                 run = whole.trace(
                     points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), 0, every * int(period[i, j])
