@@ -80,9 +80,9 @@ def comparison_time(ax: Axes, result: xr.Dataset, *, y: Name | None = None, peri
             some, word = shown[:: max(1, len(shown) // 120)], measured_label(result)
             ax.plot(phase[some], values[some], "o", label=word, color=MEASURED, markersize=1.6, markeredgewidth=0)
     ax.margins(x=0)
-    style.legend(ax, columns=3)
     ax.set_xlabel("time (forcing periods)")
     name_axes(ax, y=name_and_unit(result, name))
+    style.legend(ax, columns=3)
 
 
 @figure()
@@ -107,8 +107,8 @@ def comparison_record(ax: Axes, result: xr.Dataset, *, y: Name | None = None) ->
     looks: style.Properties = {"color": MEASURED, "markersize": 1.6, "markeredgewidth": 0}
     ax.plot(time, here["measured"].values, "o", label=measured_label(result), **looks)
     ax.margins(x=0)
-    style.legend(ax, columns=3)
     name_axes(ax, name_and_unit(result, "time"), name_and_unit(result, name))
+    style.legend(ax, columns=3)
 
 
 @figure(ratio=0.85)
@@ -152,8 +152,8 @@ def comparison_phase_portrait(
         ax.plot(*points, "o", label=f"section points, {word}", **looks)
     if zone is not None:
         shade_zone(ax, edge_of(result, zone))
-    style.legend(ax)
     name_plane(ax, result, *names)
+    style.legend(ax)
 
 
 @figure(ratio=0.85)
@@ -245,8 +245,8 @@ def comparison_diagram(ax: Axes, result: xr.Dataset, *, y: Name | None = None, s
     style.cloud(ax, read, size, MEASURED, measured_label(result))
     _flips(ax, result)
     ax.margins(x=0)
-    style.legend(ax)
     name_plane(ax, result, parameter, name)
+    style.legend(ax)
 
 
 def _flips(ax: Axes, result: xr.Dataset) -> None:
@@ -304,8 +304,8 @@ def comparison_response(ax: Axes, result: xr.Dataset, *, digits: Annotated[int, 
     written = _jumps(ax, result, digits)
     ax.set_ylim(bottom=0)
     ax.margins(x=0.02)
-    style.legend(ax)
     name_plane(ax, result, parameter, state, "amplitude of ")
+    style.legend(ax)
     style.apart(ax, written)
 
 
