@@ -10,7 +10,7 @@ grazing                   largest local maximum of the margin that is touched;
                           where motion turns in a crossing, its value there
 ========================  ====================================================
 
-psi is differentiated by central differences, in the unknowns and in both parameters.
+psi is differentiated by differences, in the unknowns and in both parameters.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from nonsmooth.continuation.problems.solve import determinant
 from nonsmooth.system.system import System
 
 STEP = 1e-6  # of central differences, in scaled unknowns
+JUMP = 100.0  # times the largest slope: more is no derivative
 KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's method
 CLOSE = 2e-12
 AT = 1e-4  # of the period: a maximum as near to a crossing may be that crossing
@@ -107,16 +108,17 @@ class Locus(Orbits):
         self._unit = size if np.isfinite(size) and size > 0 else 1.0
 
     def gradient(self, Y: FloatArray) -> FloatArray:
-        """d psi / dY by central differences."""
-        g = np.empty(self.n)
-        for j in range(self.n):
-            ahead, behind = Y.copy(), Y.copy()
-            ahead[j] += STEP
-            behind[j] -= STEP
-            motions = (self.shooting.evaluate(Y * self.scale, self.kind != "grazing") for Y in (ahead, behind))
-            one, other = map(self.psi, motions)
-            g[j] = (one - other) / (2 * STEP)
-        return g
+        """d psi / dY by central differences; by that to one side where psi jumps on the other: of a motion that a
+        crossing parts beside the touch there may be no maximum."""
+
+        def psi(Y: FloatArray) -> float:
+            return self.psi(self.shooting.evaluate(Y * self.scale, self.kind != "grazing"))
+
+        here, off = psi(Y), STEP * np.eye(self.n)
+        sides = np.array([[psi(Y + one) - here, here - psi(Y - one)] for one in off]) / STEP
+        low, high = np.sort(np.abs(sides)).T
+        nearer = np.where(np.abs(sides[:, 0]) == low, *sides.T)
+        return np.where(high <= JUMP * low.max(), sides.mean(axis=1), nearer)
 
     def fill(self, solved: Solved, matrix: FloatArray) -> None:
         """Put the Jacobian and the gradient of psi into ``matrix``; one that was taken near by serves."""
