@@ -326,6 +326,14 @@ def test_the_schema_takes_every_study_of_the_documentation_and_of_init() -> None
         judge.validate(tomllib.loads(study_text(once(model), model, verb, "study")))
 
 
+def test_an_editor_shows_what_each_option_is() -> None:
+    verbs = {name: one["properties"] for name, one in schema()["properties"].items() if name in VERBS}
+    silent = [
+        (verb, name) for verb, options in verbs.items() for name, one in options.items() if "description" not in one
+    ]
+    assert verbs and not silent
+
+
 @pytest.mark.parametrize("verb", VERBS)
 def test_names_in_other_letters_are_read_back(verb: str) -> None:
     """Also those in comments, when the comment sign is taken away."""

@@ -155,3 +155,26 @@ def test_readings_without_noise_have_the_uncertainty_of_rounding_and_no_notes_on
         assert found.estimate("a").uncertainty == pytest.approx(least * np.sqrt(C[0, 0]), rel=0.02)
         assert abs(found["a"] - 2.0) < found.uncertainty["a"]
         assert not [note for note in found.notes if "outliers" in note or "correlates by" in note]
+
+
+def test_the_gain_of_a_state_without_a_unit_has_none() -> None:
+    """Readings 3 x: slope and start known, the gain is that of regression through the state."""
+    data = readings(x0=1.0, a=1.5)
+    known = {"free_start": False, "start": {"x": 1.0}}
+    shown = data.assign(x=3.0 * data["x"])
+    sensor = {"x": ns.Sensor("x", gain=2.5)}
+    gain = ns.fit(line(), shown, ["x.gain"], measured=sensor, progress=False, **known).extra["x.gain"]
+    state = 1.0 + 1.5 * data["time"].values
+    assert gain.unit == "" and gain.value == pytest.approx(shown["x"].values @ state / (state @ state), rel=1e-9)
+    of_metres = ns.fit(line("m"), shown, ["x.gain"], measured=sensor, progress=False, **known).extra["x.gain"]
+    assert of_metres.unit == "1/(m)"
+
+
+def test_an_error_counts_in_the_fold_that_holds_it_out() -> None:
+    """The last reading but one is 50 noise deviations off: its block alone has that error, about 1 have the others."""
+    data = readings(n=200)
+    data["x"][-2] += 50 * NOISE
+    decay = ns.System(states=["x"], parameters={"b": -0.5}, modes={"m": lambda t, u, p: (-p.b * u.x,)})
+    found = ns.select_model({"line": (line(), ["a"]), "growth": (decay, ["b"])}, data, folds=3, progress=False)
+    small, large = np.sort(found["squared_error"].sel(model="line").values)[[-2, -1]]
+    assert small < 3.0 and large > 20.0

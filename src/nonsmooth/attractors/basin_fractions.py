@@ -51,6 +51,7 @@ def basin_fractions(
     ----------
     system : System
     parameter : str
+        The one that is varied.
     values : array (P,)
         Attractors are matched from each value to the next in the order of rising values.
     n_starts : int

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
+from nonsmooth.identification.compare.orbits import _cubic, common_length, fold, mean_orbit, orbit_distance
 from nonsmooth.identification.compare.periods import flips, measured_period
 
 ANGLE = 2 * np.pi * np.arange(64) / 64
@@ -90,3 +90,11 @@ def test_a_motion_that_is_doubled_in_the_middle_flips_twice() -> None:
     assert flips(values, [1, 1, 1, 1, 2, 2, 1, 1, 1, 1, 1, 1]) == [("1-2", True, 3.5), ("1-2", False, 5.5)]
     assert flips(values, [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2]) == [("1-2", True, 10.5)]
     assert flips(values, [1, 1, 1, 1, 2, 2, 1, 1, 1, 1, 1, 1], least=3) == []
+
+
+def test_between_samples_stands_the_cubic_of_the_four_about_a_place() -> None:
+    """Of x^4 it is off by the product of the distances: 9/16 in the middle of four, 15/16 at the ends of the record."""
+    x = np.arange(8.0)
+    at = x[:-1] + 0.5
+    off = at**4 - _cubic(x, x[:, None] ** 4, at)[:, 0]
+    assert off == pytest.approx([-15 / 16, *[9 / 16] * 5, -15 / 16], abs=1e-10)
