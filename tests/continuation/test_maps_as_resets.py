@@ -47,6 +47,7 @@ def test_the_period_near_a_flip(r: float, period_number: int, multiplier: float)
     orbit = ns.find_orbit(logistic(r), start={"x": 0.3})
     assert orbit.period_number == period_number
     assert orbit.floquet_multipliers == pytest.approx([multiplier], abs=1e-9)
+    assert "rest (at 0.5) rest" in repr(orbit)
 
 
 def test_the_period_of_henons_cycle_near_its_flip() -> None:

@@ -37,4 +37,6 @@ def test_a_band_over_the_amplitude(name: str, scale: float) -> None:
         assert (height.min(), height.max()) == pytest.approx(ends, rel=1e-3)
     (line,) = (one for one in ax.lines if one.get_label() == "mode")
     assert line.get_ydata() == pytest.approx(scale * y)
+    (each,) = (one for one in ax.containers if one.get_label() == "each curve by itself")
+    assert each.lines[0].get_ydata() == pytest.approx(scale * y[:4])
     plt.close(ax.figure)
