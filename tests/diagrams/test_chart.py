@@ -198,7 +198,8 @@ def test_labels_only_stay_small(support: ns.System) -> None:
 
     _, plan = section_plan(support, None)
     settler = Settler(support, engine_for(support), plan, 440, 60, 16, extremes=False)
-    work = ChartWork(settler, {"omega": np.linspace(3, 7, 4000), "rho": np.linspace(0.1, 0.3, 4000)}, np.zeros((1, 2)))
+    grid = {"omega": np.linspace(3, 7, 4000), "rho": np.linspace(0.1, 0.3, 4000)}
+    work = ChartWork(settler, grid, np.zeros((1, 2)), np.zeros(1, dtype=np.int64))
     per_point = sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
     assert per_point * 16_000_000 < 0.5 * 2**30
 

@@ -27,31 +27,20 @@ def slopes_beside_differences(system: ns.System, run: Any, names: list[str], inp
             np.testing.assert_allclose(slope[:, i], (below - above) / (2 * step), atol=2e-6, err_msg=name)
 
 
+def oscillator(parameters: Mapping[str, float], force: Any, **more: Any) -> ns.System:
+    return ns.mechanical(1.0, 0.2, 9.0, coordinates=["q"], parameters=parameters, forcing={"q": force}, **more)
+
+
 def test_of_a_forced_motion_with_impacts() -> None:
-    system = ns.mechanical(
-        1.0,
-        0.2,
-        9.0,
-        coordinates=["q"],
-        parameters={"w": 2.0},
-        forcing={"q": lambda t, p: np.cos(p.w * t)},
-        elements={"wall": ns.elements.Stop(at="q", position=0.3, restitution=0.7)},
-    )
+    wall = ns.elements.Stop(at="q", position=0.3, restitution=0.7)
+    system = oscillator({"w": 2.0}, lambda t, p: np.cos(p.w * t), elements={"wall": wall})
     run = ns.simulate(system, duration=12, samples=601, start={"q": 0.1})
     slopes_beside_differences(system, run, ["w", "q.delay", "v_q.delay", "clock", "phase"], None)
 
 
 @pytest.mark.parametrize("between", ["linear", "steps"])
 def test_of_a_motion_under_an_input_with_a_delay(between: Any) -> None:
-    system = ns.mechanical(
-        1.0,
-        0.2,
-        9.0,
-        coordinates=["q"],
-        parameters={"late": 0.0131},
-        forcing={"q": lambda t, p: p.force},
-        inputs={"force": "N"},
-    )
+    system = oscillator({"late": 0.0131}, lambda t, p: p.force, inputs={"force": "N"})
     t = np.arange(0.0, 14.0, 0.1)
     force = np.random.default_rng(0).standard_normal(len(t))
     inputs = {"force": ns.Input(t, force, between=between, delay="late")}

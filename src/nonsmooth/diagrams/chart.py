@@ -154,11 +154,11 @@ def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> Plann
         settler,
         axes,
         np.array([state.place for state in begun]),
+        settler.told(np.array([state.counters[0] for state in begun])),
         along is not None,
         n_exponent,
         tuple(measured),
         chunk=CHUNK if settler.device == "cpu" else BATCH,
-        modes=settler.told(np.array([state.counters[0] for state in begun])),
         described=inputs(system, "chart", asked | {"grid": values}),
     )
 

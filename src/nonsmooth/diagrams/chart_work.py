@@ -41,18 +41,18 @@ class ChartWork:
         Returns over which the exponent is measured; 0: not wanted.
     loads : tuple of str
         Names of the loads of elements, where they are wanted.
-    modes : array, optional
-        Modes at the starts (``Settler.told``); that of phase 0 where not given.
+    modes : array (S,)
+        Modes at the starts (``Settler.told``).
     """
 
     settler: Settler
     grid: Mapping[str, FloatArray]
     starts: FloatArray  # (S, n + memory)
+    modes: Any
     carried: bool = False
     lyapunov: int = 0
     loads: tuple[str, ...] = ()
     where: IntArray | None = None
-    modes: Any = None
     chunk: int = CHUNK
     described: Mapping[str, Any] = field(default_factory=dict)
 
@@ -117,12 +117,11 @@ class ChartWork:
         points = self.settler.system.parameter_points({a: values_a[row], b: values_b[column]})
         n_places, n_starts = len(places), len(self.starts)
         rows = np.repeat(np.arange(n_places), n_starts)
-        modes = None if self.modes is None else self.settler.retold(self.modes)
+        modes = self.settler.retold(self.modes)
         if self.carried:
             found = along_rows(self.settler, points, self._shape[1], self.starts, modes)
         else:
-            every = None if modes is None else np.tile(modes, n_places)
-            found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)), modes=every)
+            found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)), modes=np.tile(modes, n_places))
         arrays = {
             "period_number": found.period_number,
             "status": found.status,
@@ -154,16 +153,14 @@ class ChartWork:
         return kept
 
 
-def along_rows(
-    settler: Settler, points: FloatArray, length: int, starts: FloatArray, modes: IntArray | None = None
-) -> Settled:
+def along_rows(settler: Settler, points: FloatArray, length: int, starts: FloatArray, modes: IntArray) -> Settled:
     """Each row of ``length`` points from each start, the state carried along it.
 
     Parameters
     ----------
     points : array (rows * length, n_parameters)
     starts : array (S, n + memory)
-    modes : array (S,), optional
+    modes : array (S,)
 
     Returns
     -------
@@ -175,22 +172,20 @@ def along_rows(
     parts = []
     for first in range(0, len(points), length):
         rows = np.arange(first, first + length)
-        for k, start in enumerate(starts):
-            own = None if modes is None else np.tile(modes[k], length)
-            parts.append(settler.run(points, rows, np.tile(start, (length, 1)), carried=True, modes=own))
+        for start, mode in zip(starts, modes, strict=True):
+            begun = np.tile(start, (length, 1))
+            parts.append(settler.run(points, rows, begun, carried=True, modes=np.tile(mode, length)))
     order = np.arange(len(points) * len(starts)).reshape(-1, len(starts), length)
     return Settled.joined(parts)[order.transpose(0, 2, 1).ravel()]
 
 
-def side_by_side(
-    settler: Settler, points: FloatArray, length: int, starts: FloatArray, modes: IntArray | None = None
-) -> Settled:
+def side_by_side(settler: Settler, points: FloatArray, length: int, starts: FloatArray, modes: IntArray) -> Settled:
     """The same, all rows together from point to point, by the exact flow of planar systems.
 
     A run goes on from where the one at the point before has ended; from its start where that one failed, or where a
     stop has moved over its state."""
     n_rows, n_starts = len(points) // length, len(starts)
-    begin, own = np.tile(starts, (n_rows, 1)), None if modes is None else np.tile(modes, n_rows)
+    begin, own = np.tile(starts, (n_rows, 1)), np.tile(modes, n_rows)
     first = np.repeat(np.arange(n_rows) * length, n_starts)
     goes_on = np.zeros(len(first), dtype=bool)
     parts: list[Settled] = []
@@ -204,8 +199,7 @@ def side_by_side(
             goes_on[which] = carried.status != codes.NO_CONVERGENCE  # with this flow: a start beyond a stop
         which = np.flatnonzero(~goes_on)
         if len(which):
-            there = None if own is None else own[which]
-            found.put(which, settler.run(points, rows[which], begin[which], modes=there))
+            found.put(which, settler.run(points, rows[which], begin[which], modes=own[which]))
         parts.append(found)
         goes_on = usable(found.status)
     order = np.arange(len(points) * n_starts).reshape(length, n_rows, n_starts)

@@ -311,7 +311,8 @@ def legend(ax: Axes, loc: str = "", columns: int = 2) -> Legend:
 
     Above them it ends at their right edge; a wider one goes on over what stands beside them."""
     whole: Any = ax.figure.canvas.figure  # of a figure within a figure too
-    whole.draw_without_rendering()
+    if not loc:
+        whole.draw_without_rendering()
     box = ax.get_window_extent()
     for number in range(columns, 0, -1):  # names of modes may be long
         made = ax.legend(**({"loc": loc} if loc else _ABOVE), ncols=number, columnspacing=1.0)

@@ -306,10 +306,10 @@ class Engine(ABC):
             touched = [part[by_time] for part in touches]
         log = TrajectoryLog(*(*sampled[1:], *taken, *touched, int(code)))
         if self.lacking.any():
-            ends = np.array([(t.source, t.target) for t in self.traced.transitions], dtype=np.int64).reshape(-1, 2)
-            for u, modes in zip((log.u_before, log.u_after), ends[log.crossing_transition].T, strict=True):
-                self.hide(u, modes)
             self.hide(log.sample_u, log.sample_mode)
+            jumps = [self.traced.transitions[k] for k in log.crossing_transition]
+            self.hide(log.u_before, [jump.source for jump in jumps])
+            self.hide(log.u_after, [jump.target for jump in jumps])
         return log
 
 

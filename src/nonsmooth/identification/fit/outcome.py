@@ -110,11 +110,7 @@ def outcome(
         notes=notes,
         anomalies=[*_anomalies(grown, data), *_far_off(grown)],
         synthetic=synthetic,
-        bounds={
-            name: (low if low > -np.inf else None, high if high < np.inf else None)
-            for name, low, high in zip(u.names, u.low.tolist(), u.high.tolist(), strict=True)
-            if name in estimates and (low > -np.inf or high < np.inf)
-        },
+        bounds={name: pair for name, pair in u.bounds.items() if name in estimates},
     )
 
 

@@ -219,6 +219,15 @@ class Unknowns:
     precision: FloatArray
     places: NDArray[np.intp]
 
+    @property
+    def bounds(self) -> dict[str, tuple[float | None, float | None]]:
+        """Those of the unknowns that have one, None for no end."""
+        return {
+            name: (low if low > -np.inf else None, high if high < np.inf else None)
+            for name, low, high in zip(self.names, self.low.tolist(), self.high.tolist(), strict=True)
+            if low > -np.inf or high < np.inf
+        }
+
     def clock_place(self, run: int) -> int:
         """The place of the clock of a run; -1 where it is known."""
         return int(self.places[run][len(self.active) + len(self.sensors)]) if self.clock else -1
