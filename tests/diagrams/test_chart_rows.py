@@ -30,7 +30,7 @@ def test_side_by_side(given: Any, carry: dict[str, str], options: dict[str, Any]
     work = plan_chart(system, grid, carry=carry, transient=40, keep=20, max_period=4, **options).work
     (a, outer), (b, inner) = work.grid.items()
     points = system.parameter_points({a: np.repeat(outer, len(inner)), b: np.tile(inner, len(outer))})
-    one, other = (run(work.settler, points, len(inner), work.starts) for run in (along_rows, side_by_side))
+    one, other = (run(work.settler, points, len(inner), work.starts, work.modes) for run in (along_rows, side_by_side))
     for item in fields(one):
         np.testing.assert_array_equal(getattr(one, item.name), getattr(other, item.name), err_msg=item.name)
     if system is STOP[0]:  # starts and carried states beyond the stop are among them
